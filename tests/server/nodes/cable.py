@@ -23,12 +23,12 @@ class Cable:
 
     @property
     def at_hub(self) -> tuple[str, ...]:
-        """Return the command that runs another one at the hub."""
+        """Return the beginning of a command that is executed at the hub."""
         return ("ip", "netns", "exec", self._hub)
 
     @property
     def at_node(self) -> tuple[str, ...]:
-        """Return the command that runs another one at the node."""
+        """Return the beginning of a command that is executed at the node."""
         return ("ip", "netns", "exec", self._node)
 
     def cut(self) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ class Broker:
         command = (NATS_SERVER, "--addr", address, "--port", "-1", "--ports_file_dir", str(folder), *options)
         self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
-        with contextlib.suppress(PermissionError):  # as a service of a real broker should have it
+        with contextlib.suppress(PermissionError):  # as recommended for the service of a real broker
             os.setpriority(os.PRIO_PROCESS, self.process.pid, -5)
 
         def read() -> str:
@@ -63,8 +63,8 @@ class Broker:
 def paired_by_commands(group: str, name: str, server: Path, member: Path, *options: str) -> tuple[str, str]:
     """Pair a member with the broker of a server as a technician does.
 
-    `server` and `member` are their data directories, `options` those of `accept`. Return what `accept` asks to run, and
-    what `pair` prints.
+    `server` and `member` are their data directories, `options` those of `accept`. Return the command that `accept`
+    prints for the member, and the output of `pair`.
     """
     accept = (*CLI, group, "accept", name, *options, "--host", "127.0.0.1", "--port", "0", "--data-dir", str(server))
     with subprocess.Popen(accept, stdout=subprocess.PIPE, text=True) as accepting:
@@ -184,7 +184,7 @@ class Listener:
         self.messages.append(message)
 
     def host_silent(self, host: CellHost, silent: bool) -> None:
-        """Busy machines are silent now and then."""
+        """Ignore silence, which a busy machine causes now and then."""
 
     def host_ended(self, host: CellHost, reason: Message) -> None:
         self.reasons.append(reason.text)

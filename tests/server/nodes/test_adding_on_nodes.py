@@ -28,7 +28,7 @@ class Clock(Generic):
 """
 
 
-async def added(server: Server, name: str, **more: str) -> str:
+async def add_object(server: Server, name: str, **more: str) -> str:
     """Add an object; return its id when it is online."""
     await server.ask("AddSceneObject", {"name": name, "type": "Clock", **more})
     state = await server.client.event("ObjectState", lambda data: data["state"] in ("online", "failed"))
@@ -48,17 +48,17 @@ async def server(broker: Broker, node: Node, tmp_path: Path, monkeypatch: pytest
 
 
 async def test_a_host_is_started_where_an_added_object_runs(server: Server) -> None:
-    """The first object, and so the program, is on a node. The cell file has the nodes of later ones."""
+    """The first object and the program run on a node. The cell file assigns the nodes of later objects."""
     server.services.hosts._cell = Cell([CellDevice("away", "Clock", node="saw")])
     await server.open(Scene("scene", id="scn_1", objects=[SceneObject("first", "Clock", id="obj_1", node=NODE)]))
     await server.start()
     online = server.services.online
 
-    here = [await added(server, name) for name in ("second", "third")]
-    pids = [await online.call(each, "pid", deadline=5.0) for each in ("obj_1", *here)]
+    added_ids = [await add_object(server, name) for name in ("second", "third")]
+    pids = [await online.call(each, "pid", deadline=5.0) for each in ("obj_1", *added_ids)]
     assert pids[0] != pids[1] == pids[2]
     assert len(online.host.host.rings) == 2
-    assert {each.object_id for each in await online.host.host.stop_all()} == {"obj_1", *here}
+    assert {each.object_id for each in await online.host.host.stop_all()} == {"obj_1", *added_ids}
 
     for name, kind, reason in (
         ("away", "Clock", r"The node saw is not connected\."),
@@ -74,7 +74,7 @@ async def test_a_host_is_started_where_an_added_object_runs(server: Server) -> N
 
 
 async def test_a_request_names_the_node_of_an_added_object(server: Server) -> None:
-    """The first objects, and so the program, are on the computer of the server."""
+    """The first objects and the program run on the computer of the server."""
     await server.open(Scene("scene", id="scn_1"))
     for name, request in (("first", "AddObjectToScene"), ("arm", "AddSceneObject")):
         await server.ask(request, {"name": name, "type": "Arm" if name == "arm" else "Clock", "node": ""})
@@ -85,21 +85,21 @@ async def test_a_request_names_the_node_of_an_added_object(server: Server) -> No
     online = server.services.online
     hosts = online.host.host
 
-    for name, kind, where, error, reason in (
+    for name, kind, node, error, reason in (
         ("away", "Clock", "saw", Arcor2Error, r"The node saw is not connected\."),
         ("first", "Clock", NODE, Arcor2Error, "first"),
         ("second_arm", "Arm", NODE, SeveralNodes, r"on one computer: arm .*, second_arm \(node press\)\."),
     ):
         with pytest.raises(error, match=reason):
-            await server.ask("AddSceneObject", {"name": name, "type": kind, "node": where})
+            await server.ask("AddSceneObject", {"name": name, "type": kind, "node": node})
     assert len(hosts.rings) == 1, "nothing was started"
     assert len(server.services.session.require_scene().objects) == 2
 
-    far = await added(server, "far", node=NODE)
-    assert server.services.session.document.scene_object(far).node == NODE
+    remote = await add_object(server, "remote", node=NODE)
+    assert server.services.session.document.scene_object(remote).node == NODE
     assert online.host.host is hosts
     assert len(hosts.rings) == 2
-    assert await online.call(far, "pid", deadline=5.0) != await online.call(
+    assert await online.call(remote, "pid", deadline=5.0) != await online.call(
         server.services.session.require_scene().objects[0].id, "pid", deadline=5.0
     )
     assert (await server.ask("CheckConnection", {"type": "Clock", "node": NODE})).alarms == []

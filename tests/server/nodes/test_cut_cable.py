@@ -25,7 +25,7 @@ def test_motion_stops_after_a_cut_and_nothing_moves_after_the_repair(tmp_path: P
             found = cut_and_heal(cable, tmp_path)
     except CannotIsolate as reason:
         pytest.skip(f"no network namespaces: {reason}")
-    (why,) = found["reasons"]  # type: ignore[misc]
-    assert f"the connection to the node {NODE} was lost" in why
-    assert found["unknown"], "an answer that was lost"
-    assert not found["late"], "a command that was sent before the repair"
+    (loss,) = found["reasons"]  # type: ignore[misc]
+    assert f"the connection to the node {NODE} was lost" in loss
+    assert found["unknown"], "the outcome of an unanswered command is not unknown"
+    assert not found["late"], "a command from before the repair was executed"

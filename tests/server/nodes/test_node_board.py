@@ -1,4 +1,4 @@
-"""The nodes as the server knows them, from announcements, with a clock that the test moves."""
+"""The board of nodes, which is built from their announcements, with a simulated clock."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -44,7 +44,7 @@ class Board:
         return found
 
 
-def test_a_node_is_seen_falls_silent_and_comes_back() -> None:
+def test_a_node_is_connected_then_silent_and_finally_forgotten() -> None:
     board = Board({})
     assert board.after(0.0) == [NodesData(True)]
     [seen] = board.after(1.0, PRESS)
@@ -52,7 +52,7 @@ def test_a_node_is_seen_falls_silent_and_comes_back() -> None:
     assert (node.name, node.state, node.computer, node.load) == ("press", NodeState.CONNECTED, "pc-7", 0.5)
     assert board.after(1.0, PRESS) == []
     busy = replace(PRESS, load=0.9, free=5)
-    assert board.after(1.0, busy) == []  # load alone is not urgent
+    assert board.after(1.0, busy) == []  # a change of the load alone is published later
     [later] = board.after(LOAD_PERIOD, busy)
     assert (later.nodes[0].load, later.nodes[0].since) == (0.9, node.since)
     [silent] = board.after(SILENT_AFTER + 0.1)
@@ -63,7 +63,7 @@ def test_a_node_is_seen_falls_silent_and_comes_back() -> None:
     assert gone.nodes == []
 
 
-def test_another_version_sessions_and_errors_are_shown() -> None:
+def test_another_version_sessions_and_errors_are_published() -> None:
     board = Board({})
     error = LastError(Message.of("The node {node} failed.", node="press"), 5.0)
     session = RunningSession("s1", "scene", "cell", 3.0)
@@ -76,7 +76,7 @@ def test_another_version_sessions_and_errors_are_shown() -> None:
     again = replace(
         PRESS, version="0.0.1", sessions=[replace(session, age=4.0)], error=replace(error, age=6.0), age=61.0
     )
-    assert board.after(1.0, again) == [], "ages alone are no change"
+    assert board.after(1.0, again) == [], "changed ages alone were published"
 
 
 def test_nodes_that_the_scene_needs_are_lost_after_a_while() -> None:
@@ -99,8 +99,8 @@ def test_nodes_that_the_scene_needs_are_lost_after_a_while() -> None:
     assert board.board.lost() == {}
 
 
-def test_objects_that_cannot_work_together_are_shown() -> None:
-    """The board asks the rule by which scenes start."""
+def test_objects_that_cannot_work_together_are_published() -> None:
+    """The board applies the same rule as the start of a scene."""
 
     def apart() -> Message | None:
         try:
@@ -128,7 +128,7 @@ def test_a_node_cannot_pretend_to_be_another_one() -> None:
     assert [each.name for each in board.board.data().nodes] == ["oven"]
 
 
-def test_without_a_broker_nothing_is_known_or_lost() -> None:
+def test_without_a_broker_no_node_is_known_or_lost() -> None:
     board = Board({}, configured=False)
     board.needed = {"press": ["arm"]}
     assert board.board.data() == NodesData(False)
@@ -148,6 +148,6 @@ def test_the_cell_file_overrides_the_node_of_a_scene() -> None:
 
 
 @pytest.mark.parametrize("name", ["*", "press.x", "press\n", "Press", "-x", "x" * 64])
-def test_a_name_that_is_no_part_of_a_subject_is_invalid(name: str) -> None:
+def test_a_node_name_that_cannot_be_part_of_a_subject_is_invalid(name: str) -> None:
     with pytest.raises(msgspec.ValidationError):
         msgspec.convert({"name": "arm", "type": "Arm", "node": name}, SceneObject)

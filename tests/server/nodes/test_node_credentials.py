@@ -87,8 +87,8 @@ async def test_a_node_is_paired_works_is_revoked_and_paired_again(
     finally:
         node.end()
     with contextlib.closing(AuditFile(server.settings.audit_file)) as file:
-        noted = [(entry.request, entry.target.split(",")[0]) for entry in file.all()]
-    assert noted == [("arcor2-hw node accept", NODE), ("arcor2-hw node revoke", NODE)]
+        audited = [(entry.request, entry.target.split(",")[0]) for entry in file.all()]
+    assert audited == [("arcor2-hw node accept", NODE), ("arcor2-hw node revoke", NODE)]
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_a_broker_on_loopback_listens_only_there(url: str, address: str) -> None
     assert listening_address(url) == address
 
 
-def test_nodes_are_listed(server: Server, capsys: pytest.CaptureFixture[str]) -> None:
+def test_accepted_nodes_are_listed(server: Server, capsys: pytest.CaptureFixture[str]) -> None:
     data = server.settings.data_dir
     assert cli.list_nodes(data_dir=data) == ExitStatus.OK
     assert "There are no nodes" in capsys.readouterr().out
@@ -152,7 +152,7 @@ FORBIDDEN = (
 
 async def test_a_node_reaches_only_its_own_subjects(server: Server) -> None:
     press, oven = await connected(accepted(server, NODE)), await connected(accepted(server, "oven"))
-    here = await connected(load(server.settings.broker_credentials))
+    hub = await connected(load(server.settings.broker_credentials))
     received: list[str] = []
 
     async def receive(message: Msg) -> None:
@@ -162,7 +162,7 @@ async def test_a_node_reaches_only_its_own_subjects(server: Server) -> None:
         await message.respond(b"answer")
 
     try:
-        for client in (here.client, oven.client):
+        for client in (hub.client, oven.client):
             await client.subscribe("arcor2.oven.>" if client is oven.client else ">", cb=receive)
             await client.flush()
         for subject in FORBIDDEN:
@@ -172,7 +172,7 @@ async def test_a_node_reaches_only_its_own_subjects(server: Server) -> None:
         await press.client.subscribe(f"arcor2.{NODE}.open", cb=answer)
         await press.client.publish(f"arcor2.{NODE}.session.node.calls", b"x")
         await press.client.flush()
-        await here.client.flush()
+        await hub.client.flush()
         await oven.client.flush()
         assert [each for each in received if not each.startswith("$SYS")] == [f"arcor2.{NODE}.session.node.calls"]
         assert len(press.errors) == 2 * len(FORBIDDEN) + 5, press.errors
@@ -187,7 +187,7 @@ async def test_a_node_reaches_only_its_own_subjects(server: Server) -> None:
         assert 'permissions violation for publish to "arcor2.oven.open"' in press.errors[-1]
         assert "arcor2.oven.open" not in received
     finally:
-        for each in (press, oven, here):
+        for each in (press, oven, hub):
             await each.client.close()
 
 
@@ -237,7 +237,7 @@ def test_credentials_are_private(tmp_path: Path) -> None:
     ]
     assert len(seeds) == 4
     assert not any(seed.decode() in configuration for seed in seeds)
-    assert settings.broker_credentials.read_bytes() != server, "the new address"
+    assert settings.broker_credentials.read_bytes() != server, "the address did not change"
 
 
 # ---------------------------------------------------------------------------------------------------- codes
@@ -258,7 +258,7 @@ class Offer:
 
 
 @pytest.fixture
-def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
+def cheap_keys(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pairing, "_COST", 1 << 10)
 
 
@@ -269,7 +269,7 @@ async def offered(valid: float = PATIENCE) -> AsyncIterator[Offer]:
         yield offer
 
 
-@pytest.mark.usefixtures("cheap")
+@pytest.mark.usefixtures("cheap_keys")
 async def test_a_code_is_valid_once() -> None:
     async with offered() as offer:
         with pytest.raises(Refused, match="The code is wrong"):
@@ -284,7 +284,7 @@ async def test_a_code_is_valid_once() -> None:
         assert offer.accepted == [key]
 
 
-@pytest.mark.usefixtures("cheap")
+@pytest.mark.usefixtures("cheap_keys")
 async def test_a_code_is_void_after_wrong_ones_and_when_it_expires() -> None:
     async with offered() as offer:
         for _ in range(pairing.ATTEMPTS):
@@ -302,7 +302,7 @@ async def test_a_code_is_void_after_wrong_ones_and_when_it_expires() -> None:
     assert offer.accepted == late.accepted == []
 
 
-@pytest.mark.usefixtures("cheap")
+@pytest.mark.usefixtures("cheap_keys")
 async def test_another_version_is_refused_and_does_not_use_up_the_code(monkeypatch: pytest.MonkeyPatch) -> None:
     async with offered() as offer:
         versions = iter(["9.9.9", own_version(), own_version()])
@@ -314,8 +314,8 @@ async def test_another_version_is_refused_and_does_not_use_up_the_code(monkeypat
         await offer.pair(offer.invitation.code)
 
 
-@pytest.mark.usefixtures("cheap")
-async def test_a_computer_in_the_middle_gets_nothing() -> None:
+@pytest.mark.usefixtures("cheap_keys")
+async def test_a_man_in_the_middle_gets_no_credentials() -> None:
     """It terminates TLS on both sides, with its own certificate, and passes everything on."""
     async with offered() as offer:
 
@@ -337,8 +337,8 @@ async def test_a_computer_in_the_middle_gets_nothing() -> None:
         await offer.pair(offer.invitation.code)
 
 
-@pytest.mark.usefixtures("cheap")
-async def test_nonsense_is_ignored() -> None:
+@pytest.mark.usefixtures("cheap_keys")
+async def test_invalid_messages_do_not_use_up_the_code() -> None:
     insecure = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     insecure.check_hostname, insecure.verify_mode = False, ssl.CERT_NONE
     async with offered() as offer:
@@ -362,7 +362,7 @@ def test_a_name_is_used_once_and_has_no_wildcards(tmp_path: Path) -> None:
             accounts.check_new(name)
 
 
-def test_keys_have_the_form_of_nats() -> None:
+def test_keys_have_the_format_of_nats() -> None:
     """The seed and its public key are those of the tests of NATS's own libraries."""
     key = SigningKey.from_seed(seed := "SUAMLK2ZNL35WSMW37E7UD4VZ7ELPKW7DHC3BWBSD2GCZ7IUQQXZIORRBU")
     assert (key.public, key.seed) == ("UCK5N7N66OBOINFXAYC2ACJQYFSOD4VYNU6APEJTAVFZB2SVHLKGEW7L", seed)

@@ -75,7 +75,7 @@ def moving(host: CellHost, file: Path) -> "asyncio.Task[bytes]":
     return asyncio.create_task(host.call("obj_arm", "move", {"file": msgspec.json.encode(str(file))}, control=True))
 
 
-async def test_calls_and_large_results(node: Node, start_host: Callable[..., Any]) -> None:
+async def test_a_host_on_a_node_returns_small_and_large_results(node: Node, start_host: Callable[..., Any]) -> None:
     host, _ = await start_host()
     await online(host)
     assert await host.call("obj_arm", "add", {"a": b"2", "b": b"3"}) == b"5"
@@ -104,7 +104,7 @@ async def test_a_stop_reaches_the_device_during_a_call(
 async def test_motion_stops_when_the_broker_is_cut_off_and_does_not_resume(
     broker: Broker, node: Node, start_host: Callable[..., Any], tmp_path: Path
 ) -> None:
-    """A suspended broker delivers nothing, and later everything, as a cable that is cut and repaired."""
+    """A suspended broker delivers everything late, like a cable that is cut and repaired."""
     host, listener = await start_host()
     await online(host)
     call = moving(host, tmp_path / "first")
@@ -117,7 +117,7 @@ async def test_motion_stops_when_the_broker_is_cut_off_and_does_not_resume(
             await task
     assert len(listener.reasons) == 1
     os.kill(broker.process.pid, signal.SIGCONT)
-    with pytest.raises(Arcor2Error):  # the host has ended: somebody has to start the scene again
+    with pytest.raises(Arcor2Error):  # the host has ended, so the scene must be started again
         await host.call("obj_arm", "add", {"a": b"1", "b": b"1"})
     again, _ = await start_host()
     await online(again)
@@ -216,7 +216,9 @@ async def test_a_host_that_dies_on_the_node_is_reported(node: Node, start_host: 
     assert listener.reasons == ["the cell host was killed by SIGKILL"]
 
 
-async def test_a_killed_node_leaves_no_files(broker: Broker, start_host: Callable[..., Any], tmp_path: Path) -> None:
+async def test_a_restarted_node_deletes_the_files_of_killed_sessions(
+    broker: Broker, start_host: Callable[..., Any], tmp_path: Path
+) -> None:
     sessions = tmp_path / "arcor2-hw" / "node" / "sessions"
     package = Package(tmp_path / "package").write({}, [], Project("p", "scn_1", id="pro_1"), "time.sleep(60)")
     node = Node(broker.url, tmp_path, name="lathe")
@@ -230,7 +232,7 @@ async def test_a_killed_node_leaves_no_files(broker: Broker, start_host: Callabl
             await asyncio.shield(host.ended)
 
         node = Node(broker.url, tmp_path, name="lathe")
-        host, _ = await start_host(broker.url, "lathe")  # removes also what a host had still used
+        host, _ = await start_host(broker.url, "lathe")  # also removes files that a host was using
         await asyncio.to_thread(wait_for, lambda: len(list(sessions.iterdir())) <= 1)
         await host.close()
         await asyncio.to_thread(wait_for, lambda: not list(sessions.iterdir()))
@@ -250,17 +252,19 @@ async def test_a_closed_scene_ends_the_host(node: Node, start_host: Callable[...
     assert "a line" in [each.text for each in listener.messages if isinstance(each, m.LogLine)]
 
 
-async def test_a_node_that_is_not_connected_is_named(start_host: Callable[..., Any]) -> None:
+async def test_the_error_names_a_node_that_is_not_connected(start_host: Callable[..., Any]) -> None:
     with pytest.raises(Arcor2Error, match="The node oven is not connected"):
         await start_host(name="oven")
 
 
-async def test_a_broker_that_does_not_run_is_named(start_host: Callable[..., Any]) -> None:
+async def test_the_error_names_a_broker_that_does_not_run(start_host: Callable[..., Any]) -> None:
     with pytest.raises(Arcor2Error, match=r"The broker at 127\.0\.0\.1:1 cannot be reached"):
         await start_host(url="nats://secret:word@127.0.0.1:1")
 
 
-async def test_tls_with_a_password(start_host: Callable[..., Any], tmp_path: Path, monkeypatch: Any) -> None:
+async def test_hosts_connect_over_tls_with_a_password(
+    start_host: Callable[..., Any], tmp_path: Path, monkeypatch: Any
+) -> None:
     config, authority = tls_configuration(tmp_path, "localhost")
     with config.open("a") as file:
         file.write("authorization {user: cell, password: secret}\n")
@@ -283,10 +287,10 @@ async def test_tls_with_a_password(start_host: Callable[..., Any], tmp_path: Pat
         broker.end()
 
 
-async def test_clocks_an_hour_apart_change_nothing(
+async def test_leases_are_valid_although_the_clocks_differ_by_an_hour(
     broker: Broker, start_host: Callable[..., Any], tmp_path: Path
 ) -> None:
-    """Leases, which are times of the monotonic clock, are valid as long as the server says."""
+    """The expiry of a lease is a time of the server's monotonic clock."""
     if subprocess.run([*AN_HOUR_AHEAD, "true"], capture_output=True, check=False).returncode:
         pytest.skip("this user may not create a time namespace (needs root and Linux 5.6)")
     node = Node(broker.url, tmp_path, name="ahead", wrapper=AN_HOUR_AHEAD)

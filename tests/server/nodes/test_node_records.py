@@ -1,4 +1,4 @@
-"""Runs on a node are stored by the server as those of hosts on its computer: inventory, checkpoints and recordings."""
+"""The server stores runs on a node like runs on its own computer: inventory, checkpoints and recordings."""
 
 import asyncio
 import os
@@ -75,7 +75,7 @@ class Cell:
         path = self.directory / "notes"
         return path.read_text().split() if path.exists() else []
 
-    async def moving(self) -> None:
+    async def until_moving(self) -> None:
         """Wait until the arm moves."""
         await asyncio.to_thread(wait_for, self.notes)
 
@@ -87,11 +87,11 @@ class Cell:
 
         return await asyncio.wait_for(found(), PATIENCE)
 
-    async def held(self) -> HeldData:
+    async def until_held(self) -> HeldData:
         held: HeldData = (await self.message(m.ProgramHeld)).held
         return held
 
-    async def ended(self) -> None:
+    async def until_ended(self) -> None:
         async with asyncio.timeout(PATIENCE):
             await asyncio.shield(self.host.ended)
 
@@ -102,9 +102,9 @@ def cell(tmp_path: Path, start_host: Callable[..., Any]) -> Cell:
 
 
 def cut(broker: Broker, host: CellHost) -> None:
-    """A suspended broker delivers nothing, and later everything, as a cable that is cut and repaired."""
+    """A suspended broker delivers everything late, like a cable that is cut and repaired."""
     os.kill(broker.process.pid, signal.SIGSTOP)
-    os.waitid(os.P_PID, broker.process.pid, os.WSTOPPED | os.WNOWAIT)  # until all its threads stand
+    os.waitid(os.P_PID, broker.process.pid, os.WSTOPPED | os.WNOWAIT)  # until all its threads are suspended
 
 
 def kill_relay(broker: Broker, host: CellHost) -> None:
@@ -117,21 +117,21 @@ async def test_a_run_that_a_fault_interrupts_continues(
 ) -> None:
     (cell.directory / "hang").touch()
     await cell.start(STEPS, broker.url)
-    await cell.moving()
+    await cell.until_moving()
     assert [action.action_name for action in cell.run.actions] == ["pick"]  # stored before it has started
     fault(broker, cell.host)
     (cell.directory / "hang").unlink()  # the action ends, but the next one must not start
-    await cell.ended()
+    await cell.until_ended()
     os.kill(broker.process.pid, signal.SIGCONT)
     assert (cell.run.ended, cell.run.last, cell.run.results["act_scan"]) == (False, "act_scan", ['"A-1"'])
     assert cell.inventory.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm")]
 
     await cell.start(STEPS, broker.url, continues=True)
-    held = await cell.held()
+    held = await cell.until_held()
     assert (held.kind, held.action_name) == ("program_interrupted", "pick")
     assert cell.notes() == ["pick"]  # nothing has moved since
     await cell.host.decide(held.number, HoldChoice.RETRY, [], "")
-    await cell.ended()
+    await cell.until_ended()
     assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
     assert (cell.run.ended, cell.inventory.counts.fed, cell.inventory.counts.good, cell.inventory.parts) == (
         True,
@@ -186,21 +186,21 @@ async def test_clients_inspect_and_continue_a_run_of_a_killed_node(
 async def test_the_inventory_is_published_and_confirmed_during_a_run(cell: Cell, broker: Broker, node: Node) -> None:
     (cell.directory / "fault").touch()
     await cell.start(ONE, broker.url)
-    held = await cell.held()
+    held = await cell.until_held()
     assert cell.inventory.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
     assert (await cell.message(m.PartsChanged)).inventory.parts == cell.inventory.parts
     assert (await cell.message(m.PartStep)).part == 1
     await cell.host.confirm_parts([ConfirmedPart(1, "obj_nest")])
     assert cell.inventory.parts == [Part(1, "obj_nest", "A-1")]
     await cell.host.decide(held.number, HoldChoice.END, [], "")
-    await cell.ended()
+    await cell.until_ended()
     assert cell.run.ended
 
 
 async def test_an_action_whose_checkpoint_is_not_stored_does_not_start(cell: Cell, broker: Broker, node: Node) -> None:
     cell.records.write_text("no directory")
     await cell.start(ONE, broker.url)
-    await cell.ended()
+    await cell.until_ended()
     end = [each for each in cell.listener.messages if isinstance(each, m.ProgramChanged)][-1]
     assert end.error is not None
     assert "The state of the run cannot be stored" in str(end.error.message)
@@ -265,7 +265,7 @@ async def test_a_failed_run_is_recorded_to_its_end_on_the_clock_of_the_server(
         node.end()
 
 
-async def test_the_relay_stores_the_recording_of_a_run_that_the_end_of_the_server_interrupts(
+async def test_the_relay_stores_the_recording_of_a_run_interrupted_by_the_end_of_the_server(
     broker: Broker, node: Node, start_host: Callable[..., Any], tmp_path: Path
 ) -> None:
     host = await start_lift(start_host, tmp_path)
@@ -276,7 +276,7 @@ async def test_the_relay_stores_the_recording_of_a_run_that_the_end_of_the_serve
 
 
 def on_node(package: Path) -> None:
-    """Let the devices of a package run on the node "lathe"."""
+    """Assign the devices of a package to the node "lathe"."""
     file = package / "data" / "scene.json"
     scene = msgspec.json.decode(file.read_bytes())
     scene["objects"][0]["node"] = "lathe"
@@ -348,19 +348,19 @@ async def test_a_node_cannot_change_the_inventory_of_another_scene(tmp_path: Pat
 
 
 def test_the_ring_of_the_server_has_the_same_records_on_its_clock() -> None:
-    """More records than a segment can hold, and an offset that changes within a segment."""
-    ours, theirs, offset = Ring(), Ring(), -100.0
-    copy = RunRecords(ours, lambda _: None, lambda moment: moment + offset)
-    sender = RingSender(theirs, lambda body: copy.handle("RingRecords", body))
+    """There are more records than a segment can hold, and the clock offset changes within a segment."""
+    server_ring, node_ring, offset = Ring(), Ring(), -100.0
+    copy = RunRecords(server_ring, lambda _: None, lambda moment: moment + offset)
+    sender = RingSender(node_ring, lambda body: copy.handle("RingRecords", body))
     names = Names(0, SignalKind.POINT, "obj", "obj", ["x"], [""])
     expected: list[list[bytes]] = []
     for number in range(30):
         if number % 10 == 0:
-            theirs.begin_segment()
+            node_ring.begin_segment()
             offset = -100.0 - number
             expected.append([])
         for record in (names, ActionStarted(200.0 + number, number, "a" * 1000), ActionEnded(200.5 + number, number)):
-            assert theirs.append(encode(record))
+            assert node_ring.append(encode(record))
             if not isinstance(record, Names):
                 record = replace(record, stamp=record.stamp - 100.0 - number // 10 * 10)
             expected[-1].append(encode(record))
@@ -369,4 +369,4 @@ def test_the_ring_of_the_server_has_the_same_records_on_its_clock() -> None:
             offset += 0.001
     sender.flush()
     sender.flush()
-    assert [[bytes(each) for each in records(segment)] for segment in ours.segments()] == expected
+    assert [[bytes(each) for each in records(segment)] for segment in server_ring.segments()] == expected

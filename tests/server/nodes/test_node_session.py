@@ -29,19 +29,19 @@ from arcor2_server.nodes.service import HostedSession
 from arcor2_server.nodes.session_clock import SessionClock
 
 
-@pytest.mark.parametrize("apart", [0.0, 3600.0, -86400.0])
+@pytest.mark.parametrize("offset", [0.0, 3600.0, -86400.0])
 @pytest.mark.parametrize("rate", [1.0, 1.0 + 4e-4, 1.0 - 4e-4])
-def test_converted_times_are_never_late_and_hardly_early(apart: float, rate: float) -> None:
-    """The peer's clock differs by `apart` s and runs at another rate; messages take 0.2 ms to 100 ms."""
+def test_a_converted_time_is_never_late_and_less_than_12_ms_early(offset: float, rate: float) -> None:
+    """The peer's clock differs by `offset` s and runs at another `rate`. Messages take 0.2 ms to 100 ms."""
     chance, clock, now = random.Random(1), SessionClock(), 1000.0
     early = []
     for _ in range(2000):
         sent = now
         arrived = sent + chance.choice([0.0002, 0.001, 0.1])
         now = arrived + chance.choice([0.0002, 0.001, 0.1])
-        clock.exchanged(sent, arrived * rate + apart, now)
+        clock.exchanged(sent, arrived * rate + offset, now)
         moment = now - chance.uniform(0.0, 0.5)
-        early.append(moment - clock.earliest(moment * rate + apart, now))
+        early.append(moment - clock.earliest(moment * rate + offset, now))
         now += 0.1
     assert min(early) >= -1e-9
     assert max(early[200:]) < 0.012
@@ -64,7 +64,7 @@ def test_long_messages_are_divided_and_joined(size: int) -> None:
         assert (header.number, header.sent, header.flags, found) == (number, 1.5, END, body)
 
 
-def test_a_lost_part_is_noticed() -> None:
+def test_a_lost_part_raises_an_error() -> None:
     writer, reader = LaneWriter(), LaneReader()
     first, second = [next(writer.parts(number, 0.0, 0, b"x")) for number in (1, 2)]
     with pytest.raises(MessageLost):
@@ -121,7 +121,7 @@ def test_another_version_is_refused_in_one_sentence() -> None:
     )
 
 
-class Passing:
+class NodeSession:
     """A session on a node whose clock agrees with the server's, without a broker."""
 
     def __init__(self) -> None:
@@ -153,54 +153,54 @@ class Passing:
 
 
 @pytest.fixture
-def passing() -> Passing:
-    return Passing()
+def node_session() -> NodeSession:
+    return NodeSession()
 
 
-def test_a_command_that_a_stop_has_overtaken_is_not_executed(passing: Passing) -> None:
+def test_a_command_that_a_stop_has_overtaken_is_not_executed(node_session: NodeSession) -> None:
     stop = m.StopMotion(7, "arm")
-    passing.receive(stop, 5, lane=Lane.STOP)
-    passing.receive(m.Call(1, "arm", "move"), 4)
-    passing.receive(other := m.Call(2, "belt", "move"), 3)
-    passing.receive(after := m.Call(3, "arm", "move"), 6)
-    assert passing.host == [stop, other, after]
-    ((lane, refused),) = passing.server
+    node_session.receive(stop, 5, lane=Lane.STOP)
+    node_session.receive(m.Call(1, "arm", "move"), 4)
+    node_session.receive(other := m.Call(2, "belt", "move"), 3)
+    node_session.receive(after := m.Call(3, "arm", "move"), 6)
+    assert node_session.host == [stop, other, after]
+    ((lane, refused),) = node_session.server
     assert (lane, refused.id, refused.error.code) == (Lane.CALLS, 1, "cancelled")
-    passing.receive(all_stop := m.StopAll(8), 9, lane=Lane.STOP)
-    passing.receive(m.Call(4, "belt", "move"), 8)
-    passing.receive(m.Resume(), 7)
-    passing.receive(subscribe := m.Subscribe("arm", True, False), 8)  # starts nothing
-    assert passing.host[3:] == [all_stop, subscribe]
+    node_session.receive(all_stop := m.StopAll(8), 9, lane=Lane.STOP)
+    node_session.receive(m.Call(4, "belt", "move"), 8)
+    node_session.receive(m.Resume(), 7)
+    node_session.receive(subscribe := m.Subscribe("arm", True, False), 8)  # starts nothing
+    assert node_session.host[3:] == [all_stop, subscribe]
 
 
-async def test_a_late_command_is_not_executed(passing: Passing) -> None:
-    passing.receive(m.Call(1, "arm", "move"), 1, age=1.0)
-    passing.receive(m.Call(2, "arm", "state", deadline=0.1), 2, age=0.2)
-    passing.receive(m.Resume(), 3, age=1.0)
-    passing.receive(m.Lease(3, "arm", 1, HoldKind.JOG, time.monotonic() + 5.0), 3, age=1.0)
-    passing.receive(stop := m.StopMotion(4, "arm"), 4, lane=Lane.STOP, age=1.0)
-    assert passing.host == [stop], "a late stop is better than none"
-    assert [getattr(message, "id", None) for _, message in passing.server] == [1, 2, None, 3]
-    assert {message.error.code for _, message in passing.server if isinstance(message, m.CallFailed)} == {
+async def test_a_late_command_is_not_executed(node_session: NodeSession) -> None:
+    node_session.receive(m.Call(1, "arm", "move"), 1, age=1.0)
+    node_session.receive(m.Call(2, "arm", "state", deadline=0.1), 2, age=0.2)
+    node_session.receive(m.Resume(), 3, age=1.0)
+    node_session.receive(m.Lease(3, "arm", 1, HoldKind.JOG, time.monotonic() + 5.0), 3, age=1.0)
+    node_session.receive(stop := m.StopMotion(4, "arm"), 4, lane=Lane.STOP, age=1.0)
+    assert node_session.host == [stop], "only the late stop is executed"
+    assert [getattr(message, "id", None) for _, message in node_session.server] == [1, 2, None, 3]
+    assert {message.error.code for _, message in node_session.server if isinstance(message, m.CallFailed)} == {
         "arrived_late"
     }
-    passing.receive(release := m.Lease(5, "arm", 1, HoldKind.JOG, 0.0), 5, age=1.0)
-    passing.receive(m.RunPackage("pkg_1", "sha256:0:x"), 6, age=1.0)
-    assert passing.host == [stop, release, "closed"], "a session that has not started its work ends"
-    assert passing.session._failing is not None
-    await passing.session._failing
-    assert "was not executed" in passing.server[-1][1]
+    node_session.receive(release := m.Lease(5, "arm", 1, HoldKind.JOG, 0.0), 5, age=1.0)
+    node_session.receive(m.RunPackage("pkg_1", "sha256:0:x"), 6, age=1.0)
+    assert node_session.host == [stop, release, "closed"], "a session that has not started its work ends"
+    assert node_session.session._failing is not None
+    await node_session.session._failing
+    assert "was not executed" in node_session.server[-1][1]
 
 
-def test_answers_of_stops_and_large_results_have_lanes_of_their_own(passing: Passing) -> None:
-    passing.receive(m.StopMotion(4, "arm"), 1, lane=Lane.STOP)
+def test_answers_of_stops_and_large_results_have_separate_lanes(node_session: NodeSession) -> None:
+    node_session.receive(m.StopMotion(4, "arm"), 1, lane=Lane.STOP)
     large = b"x" * 100_000
     for message in (
         m.CallDone(4), m.CallDone(5), m.CallDone(6, large), m.StreamEvent("e", "arm", large),
         m.ProgramEvent("PackageInfo", large),
     ):  # fmt: skip
-        passing.session._from_host(encoded(message))
-    assert [lane for lane, _ in passing.server] == [Lane.STOP, Lane.CALLS, Lane.FRAMES, Lane.FRAMES, Lane.CALLS]
+        node_session.session._from_host(encoded(message))
+    assert [lane for lane, _ in node_session.server] == [Lane.STOP, Lane.CALLS, Lane.FRAMES, Lane.FRAMES, Lane.CALLS]
 
 
 # ---------------------------------------------------------------------------------------------------- files
@@ -242,11 +242,14 @@ def test_a_package_is_sent_without_data_stored_only_at_the_server(tmp_path: Path
     store = ContentStore(tmp_path / "store")
     run = m.RunPackage("pkg_1", str(package), records="/records", recordings="/recordings")
     found, sent = delivered(run, store, folder)
-    there = Path(found.directory)
-    assert sorted(each.relative_to(there).as_posix() for each in there.rglob("*.*")) == ["data/scene.json", "script.py"]
-    assert (there / "script.py").read_text() == "pass"
+    received = Path(found.directory)
+    assert sorted(each.relative_to(received).as_posix() for each in received.rglob("*.*")) == [
+        "data/scene.json",
+        "script.py",
+    ]
+    assert (received / "script.py").read_text() == "pass"
     assert (len(sent), found.records, found.recordings) == (3, "", "")
-    (there / "script.py").write_text("changed")
+    (received / "script.py").write_text("changed")
     again, sent = delivered(run, store, folder)
     assert (sent, (Path(again.directory) / "script.py").read_text()) == ([], "pass")
     assert found.records_at_server
@@ -255,7 +258,7 @@ def test_a_package_is_sent_without_data_stored_only_at_the_server(tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd", "/etc/passwd"])
-def test_a_package_cannot_write_elsewhere(tmp_path: Path, name: str) -> None:
+def test_a_package_cannot_write_outside_its_directory(tmp_path: Path, name: str) -> None:
     store = ContentStore(tmp_path / "store")
     files = [b"evil", msgspec.json.encode({name: hashlib.sha256(b"evil").hexdigest()})]
     for content in files:
@@ -272,7 +275,7 @@ def test_an_invalid_reference_is_refused(tmp_path: Path, reference: str) -> None
         ContentStore(tmp_path).unpacked(encoded(body), tmp_path)
 
 
-def test_files_that_were_not_used_for_the_longest_time_are_removed(tmp_path: Path) -> None:
+def test_the_least_recently_used_files_are_removed(tmp_path: Path) -> None:
     contents = [bytes([number]) * 1000 for number in range(5)]
     digests = [hashlib.sha256(content).hexdigest() for content in contents]
     store = ContentStore(tmp_path, limit=2500)

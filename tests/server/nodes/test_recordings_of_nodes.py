@@ -105,7 +105,7 @@ def write(data: Path, name: str, file: Path, **nodes: str) -> None:
 
 
 def check(recording: dict[str, Any], *, failed: bool) -> None:
-    """Check that levels of both computers changed while the action ran that fills them."""
+    """Check that the level of each device changed while the action that fills it ran."""
     signals = [(each["object_name"], each["name"]) for each in recording["signals"]]
     assert len(signals) == len(set(signals))
     assert {(device, name) for device in ("near", "far") for name in ("level", "connected", "gripped")} <= set(signals)
@@ -120,7 +120,7 @@ def check(recording: dict[str, Any], *, failed: bool) -> None:
 
 
 async def test_a_recording_has_the_values_of_all_computers(broker: Broker, ahead: Node, tmp_path: Path) -> None:
-    """The robots' computer is that of the server first, then the node; its server is killed."""
+    """The main host is on the server's computer in the first run, on the node in the second. The server is killed."""
     data, file = tmp_path / "data", tmp_path / "waits"
     write(data, "pkg_1", file, near="", far=AHEAD)
     write(data, "pkg_2", file, near=AHEAD, far="", other=AHEAD)

@@ -171,7 +171,7 @@ class Cell:
     def notes(self) -> list[str]:
         return self.file.read_text().splitlines()
 
-    async def noted(self, *lines: str) -> None:
+    async def until_noted(self, *lines: str) -> None:
         await asyncio.to_thread(wait_for, lambda: set(lines) <= set(self.notes()))
 
     async def take(self) -> HostGroup:
@@ -225,7 +225,7 @@ def objects_on(**nodes: str) -> list[SceneObject]:
     return [SceneObject(name, kinds.get(name, "Reader"), id=name, node=node) for name, node in nodes.items()]
 
 
-def test_robots_decide_where_the_main_host_is() -> None:
+def test_the_main_host_is_on_the_node_of_the_robots() -> None:
     found = place(None, objects_on(arm="press", reader="oven", clock="", box=""), derives)
     assert (found.main, found.all) == ("press", ["press", "oven", ""])
     assert found.nodes == {"arm": "press", "reader": "oven", "clock": "", "box": "press"}
@@ -283,17 +283,17 @@ threading.Thread(target=lambda: arm.slow(60.0, an="slow")).start()
 threading.Thread(target=lambda: reader.move(an="move")).start()
 belt.move(an="move")
 """)
-    await cell.noted("slow", "reader moves", "belt moves")
+    await cell.until_noted("slow", "reader moves", "belt moves")
     began = time.monotonic()
     os.kill(oven.process.pid, signal.SIGSTOP)
     try:
-        await cell.noted("stop", "reader stopped")
+        await cell.until_noted("stop", "reader stopped")
         assert time.monotonic() - began < PATIENCE
         await asyncio.to_thread(wait_for, lambda: cell.listener.reasons)
         (reason,) = cell.listener.reasons
         assert f"the node {OVEN}" in reason
         assert "It is not known whether belt.move was executed" in reason
-        await cell.noted("belt stopped")
+        await cell.until_noted("belt stopped")
     finally:
         os.kill(oven.process.pid, signal.SIGCONT)
     moved = [each for each in cell.notes() if each.endswith("moves")]
@@ -306,7 +306,7 @@ import threading
 threading.Thread(target=lambda: arm.slow(60.0, an="slow")).start()
 belt.move(an="move")
 """)
-    await cell.noted("slow", "belt moves")
+    await cell.until_noted("slow", "belt moves")
     group.send(m.StopProgram())
     end = await cell.end()
     assert (end.finished, end.error) == (False, None)
@@ -331,7 +331,7 @@ async def test_calls_go_to_the_host_of_the_object_and_stops_to_all(cell: Cell) -
     code = await group.call("obj_belt", "scan", {"where": where}, control=True)
     assert code.startswith(b'["code 1 of ')
     moves = [asyncio.create_task(group.call(each, "move", control=True)) for each in ("obj_reader", "obj_belt")]
-    await cell.noted("reader moves", "belt moves")
+    await cell.until_noted("reader moves", "belt moves")
     stops = await group.stop_all()
     assert sorted(each.object_id for each in stops) == ["obj_arm", "obj_belt", "obj_reader"]
     for each in moves:
@@ -348,16 +348,16 @@ async def test_calls_go_to_the_host_of_the_object_and_stops_to_all(cell: Cell) -
 async def test_the_end_of_the_main_host_stops_the_other_computers(cell: Cell) -> None:
     group = await cell.online()
     moving = asyncio.create_task(group.call("obj_belt", "move", control=True))
-    await cell.noted("belt moves")
+    await cell.until_noted("belt moves")
     os.kill(group.pid, signal.SIGKILL)
-    await cell.noted("belt stopped", "reader disconnected")
+    await cell.until_noted("belt stopped", "reader disconnected")
     with pytest.raises(Arcor2Error):
         await moving
     assert cell.listener.reasons == ["the cell host was killed by SIGKILL"]
 
 
 async def test_an_object_of_a_node_is_connected_again_or_added_later(cell: Cell) -> None:
-    """Interlocks let the calls pass the main host, which needs its stubs."""
+    """Because of the interlocks, the calls pass through the main host, which needs stubs of the objects."""
     cell.objects[2] = cell.reader("belt", OVEN, broken=True)
     (cell.folder / "off").touch()
     group = await cell.online(interlock("obj_belt", "quick", "obj_reader"), keep_going=True)
@@ -377,7 +377,7 @@ async def test_an_object_of_a_node_is_connected_again_or_added_later(cell: Cell)
     assert {"belt control", "lamp control"} <= set(cell.notes())
 
 
-async def test_a_host_that_cannot_be_started_is_named_with_its_objects(cell: Cell) -> None:
+async def test_the_error_names_a_host_that_cannot_be_started_and_its_objects(cell: Cell) -> None:
     cell.objects[2] = cell.reader("belt", "saw")
     with pytest.raises(Arcor2Error, match=r"The node saw is not connected\. These objects run there: belt"):
         await cell.take()
@@ -403,7 +403,7 @@ def interlock(object_id: str, action: str, needed: str, observed: str = "closed"
 
 @pytest.mark.parametrize("observed", ["closed", "timed"])
 async def test_an_interlock_across_computers_prevents_an_action(cell: Cell, observed: str) -> None:
-    """The belt is on one node, what it needs on another one; the robot, and so the interlocks, on this computer."""
+    """The belt and the reader that it needs are on two nodes. The robot's host checks the interlocks."""
     group = await cell.online(interlock("obj_belt", "move", "obj_reader", observed, during=True))
     await group.call("obj_reader", "set_closed", {"value": b"false"})
     await cell.listener.until(m.InterlocksChanged, lambda each: each.states[0].state is InterlockCondition.NOT_MET)
@@ -412,7 +412,7 @@ async def test_an_interlock_across_computers_prevents_an_action(cell: Cell, obse
     await group.call("obj_reader", "set_closed", {"value": b"true"})
     await cell.listener.until(m.InterlocksChanged, lambda each: each.states[0].state is InterlockCondition.MET)
     moving = asyncio.create_task(group.call("obj_belt", "move", control=True))
-    await cell.noted("belt moves")
+    await cell.until_noted("belt moves")
     await group.call("obj_reader", "set_closed", {"value": b"false"})
     with pytest.raises(CellError, match=r"was stopped\. Interlock door"):
         await moving
@@ -424,7 +424,7 @@ async def test_an_interlock_stops_an_action_when_the_other_computer_does_not_ans
     await cell.listener.until(m.InterlocksChanged, lambda each: each.states[0].state is InterlockCondition.MET)
     host = int(await group.call("obj_reader", "pid"))
     moving = asyncio.create_task(group.call("obj_belt", "move", control=True))
-    await cell.noted("belt moves")
+    await cell.until_noted("belt moves")
     os.kill(host, signal.SIGSTOP)
     try:
         with pytest.raises(CellError, match="reader: closed is not confirmed, last known 1 s ago"):
@@ -437,8 +437,8 @@ async def test_an_interlock_stops_an_action_when_the_other_computer_does_not_ans
 
 
 # ------------------------------------------------------------------------------------------------ calls and stops
-class Recorded:
-    """In place of a host: stores what it is sent."""
+class HostStub:
+    """Stub of a host that stores the sent messages."""
 
     def __init__(self, node: str) -> None:
         self.node, self.sent, self.reason, self.ring = node, list[Any](), None, Ring()
@@ -455,7 +455,7 @@ class Recorded:
 
 
 async def test_a_call_that_crosses_a_stop_is_not_executed() -> None:
-    hosts = Recorded(""), Recorded(NODE)
+    hosts = HostStub(""), HostStub(NODE)
     listener: Any = Listener()
     placement = place(None, [SceneObject("arm", "Arm", id="arm"), *objects_on(reader=NODE)], derives)
     group = HostGroup(listener, placement, hosts, lambda _: None)  # type: ignore[arg-type]
