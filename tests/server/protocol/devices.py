@@ -9,7 +9,7 @@ from arcor2_hw.objects import Robot, Settings
 
 
 class Arm(Robot):
-    """Six joints that are the pose itself: position and rotation vector. It reaches what is above the floor."""
+    """Six joints that are the pose itself: position and rotation vector. It reaches every pose above the floor."""
 
     _ABSTRACT = False
     urdf_package_name = "arm.zip"
@@ -110,7 +110,7 @@ from arcor2_hw.objects import MultiArmRobot
 
 
 class TwoArms(MultiArmRobot):
-    """Two arms that stand still."""
+    """Two arms that do not move."""
 
     _ABSTRACT = False
 
@@ -196,7 +196,7 @@ from arcor2_hw.objects import CollisionObject
 
 
 class Part(CollisionObject):
-    """A part with four points at which a robot finds it."""
+    """A part with four focus points."""
 
     _ABSTRACT = False
 '''
@@ -215,7 +215,7 @@ class ChooserSettings(Settings):
 
 
 class Chooser(Generic):
-    """Something whose actions offer values that depend on each other."""
+    """A device whose actions offer values that depend on each other."""
 
     _ABSTRACT = False
     DYNAMIC_PARAMS = {"item": ("items", {"shelf", "count"}), "shelf": ("shelves", set())}
@@ -263,7 +263,7 @@ from arcor2_object_types.abstract import Robot
 
 
 class OlderArm(Robot):
-    """Three joints that are the position. Its methods name their parameters otherwise than our bases do."""
+    """Three joints that are the position. Its methods have other parameter names than the base class."""
 
     _ABSTRACT = False
 
@@ -330,7 +330,7 @@ class Arms(StrEnum):
 
 
 class OlderArms(MultiArmRobot):
-    """Two arms, which it calls `arm`."""
+    """Two arms, which are selected by the parameter `arm`."""
 
     _ABSTRACT = False
 

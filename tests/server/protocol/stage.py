@@ -151,12 +151,12 @@ class Stage:
 
     async def start(self, person: Actor) -> None:
         await person.ask("StartScene")
-        await happens(person, "SceneState", state="started")
+        await until_event(person, "SceneState", state="started")
         person.take()
 
     async def stop(self, person: Actor) -> None:
         await person.ask("StopScene")
-        await happens(person, "SceneState", state="stopped")
+        await until_event(person, "SceneState", state="stopped")
         person.take()
 
 
@@ -167,7 +167,7 @@ async def until(condition: Callable[[], bool]) -> None:
             await asyncio.sleep(0.005)
 
 
-async def happens(person: Actor, event: str, **data: Any) -> dict[str, Any]:
+async def until_event(person: Actor, event: str, **data: Any) -> dict[str, Any]:
     """Wait for an event with this data among the messages that were not taken yet. Return its data."""
     found: list[dict[str, Any]] = []
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.workspace.point_registration import fit
-from tests.server.protocol.stage import FOCUS_POINTS, Actor, Stage, happens, open_stage, refused
+from tests.server.protocol.stage import FOCUS_POINTS, Actor, Stage, open_stage, refused, until_event
 
 TRUE_POSE = Pose(Position(0.5, -0.3, 0.2), Orientation.from_rotation_vector(0.3, -0.2, 1.1))
 
@@ -54,7 +54,7 @@ def test_fit_distributes_touching_errors() -> None:
 
 
 @pytest.mark.parametrize(
-    ("points", "why"),
+    ("points", "reason"),
     [
         ([(0, 0, 0), (1, 0, 0)], "at least 3"),
         ([(0, 0, 0), (1, 0, 0), (2, 0, 0.001)], "one line"),
@@ -62,9 +62,9 @@ def test_fit_distributes_touching_errors() -> None:
         ([(0, 0, 0), (1, 0, 0), (0, math.inf, 0)], "not a finite number"),
     ],
 )
-def test_fit_refuses_degenerate_points(points: list[tuple[float, float, float]], why: str) -> None:
+def test_fit_refuses_degenerate_points(points: list[tuple[float, float, float]], reason: str) -> None:
     positions = [Position(*point) for point in points]
-    with pytest.raises(InvalidData, match=why):
+    with pytest.raises(InvalidData, match=reason):
         fit(positions, positions)
 
 
@@ -141,7 +141,7 @@ async def test_an_object_is_aimed_by_its_focus_points(tmp_path: Path) -> None:
             "ObjectAimingDone",
             "SceneObjectChanged",
         ]
-        changed = await happens(bob, "SceneObjectChanged")
+        changed = await until_event(bob, "SceneObjectChanged")
         assert changed["id"] == part
         assert near(msgspec.convert(changed["pose"], Pose), TRUE_POSE)
         live = await stage.services.online.ask(Pose, part, "pose")
@@ -161,7 +161,7 @@ async def test_an_object_is_aimed_by_its_focus_points(tmp_path: Path) -> None:
         await alice.ask("ObjectAimingCancel")
         assert "not aiming" in await refused(alice, "ObjectAimingCancel")
 
-        # A user who releases the lock cannot go on. When they start again, the earlier aiming is discarded.
+        # A user who releases the lock cannot continue. Registering again discards the earlier aiming.
         await alice.ask("ObjectAimingStart", **start)
         await alice.ask("WriteUnlock", object_id=part)
         assert "lock" in await refused(alice, "ObjectAimingAddPoint", point_idx=0)

@@ -25,7 +25,7 @@ from arcor2_server.compute.process import ProgressCallback
 from arcor2_server.errors import RequestRefused
 from arcor2_server.rest.cameras import CameraOperations
 from arcor2_server.workspace.calibration import RobotView
-from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
+from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
 
 PARAMETERS = {"fx": 600, "fy": 610, "cx": 320, "cy": 240, "dist_coefs": [0, 0, 0, 0]}
 FOUND = Pose(Position(1, 2, 3), Orientation(0, 0, 1, 0))
@@ -35,14 +35,14 @@ class Service:
     """A calibration service with preset answers, which records its requests."""
 
     def __init__(self) -> None:
-        self.asked: list[Any] = []
+        self.requests: list[Any] = []
         self.refusal: Arcor2Error | None = None
-        self.go = asyncio.Event()
-        self.go.set()
+        self.may_answer = asyncio.Event()
+        self.may_answer.set()
 
-    async def _take(self, *asked: Any) -> None:
-        self.asked.append(asked)
-        await self.go.wait()
+    async def _take(self, *requests: Any) -> None:
+        self.requests.append(requests)
+        await self.may_answer.wait()
         if self.refusal is not None:
             raise self.refusal
 
@@ -116,8 +116,8 @@ async def ready(stage: Stage, **objects: str) -> tuple[Actor, Service]:
     return alice, service
 
 
-def process(actor: Actor, name: str) -> list[tuple[str, bool]]:
-    """Return the announced states of a process, and whether each had a message."""
+def process_states(actor: Actor, name: str) -> list[tuple[str, bool]]:
+    """Return the published states of a process, and whether each had a message."""
     states = [message["data"] for message in actor.waiting if message.get("event") == "ProcessState"]
     assert {data["id"] for data in states} <= {name}
     return [(data["state"], "message" in data) for data in states]
@@ -163,13 +163,13 @@ async def test_a_camera_returns_its_picture_and_parameters(tmp_path: Path) -> No
         for item in (eye, blind, part):
             await alice.ask("WriteUnlock", object_id=item)
         await alice.ask("StopScene")
-        await happens(alice, "SceneState", state="stopped")
+        await until_event(alice, "SceneState", state="stopped")
         with pytest.raises(RequestRefused, match="offline"):
             await cameras.take_picture(eye)
 
 
 @pytest.mark.parametrize("request_name", ["GetCameraPose", "MarkersCorners"])
-async def test_client_pictures_are_calibrated_by_the_service(tmp_path: Path, request_name: str) -> None:
+async def test_pictures_of_a_client_are_evaluated_by_the_service(tmp_path: Path, request_name: str) -> None:
     async with open_stage(tmp_path) as stage:
         stranger = await stage.person()
         args: dict[str, Any] = {"camera_parameters": PARAMETERS, "image": "\xff\xd8\x00picture"}
@@ -185,18 +185,18 @@ async def test_client_pictures_are_calibrated_by_the_service(tmp_path: Path, req
             assert answer["pose"]["orientation"] == msgspec.to_builtins(inverse.orientation)
             answer = await stranger.ask(request_name, **args)
             assert answer["pose"]["position"] == {"x": 1, "y": 2, "z": 3}
-            assert service.asked.pop()[2] is None, "the pose of the camera is unknown"
+            assert service.requests.pop()[2] is None, "the pose of the camera is unknown"
         else:
             (seen,) = await stranger.ask(request_name, **args)
             assert seen["marker_id"] == 10
             assert seen["corners"][2] == {"x": 3, "y": 4}
-        parameters, (image,) = service.asked[0][:2]
+        parameters, (image,) = service.requests[0][:2]
         assert parameters.fy == 610
         assert image == b"\xff\xd8\x00picture"
         # The original never answered a request whose picture is invalid.
         assert "not a picture" in await refused(stranger, request_name, **args | {"image": "€"})
         assert "empty" in await refused(stranger, request_name, **args | {"image": ""})
-        assert len(service.asked) == 1
+        assert len(service.requests) == 1
         service.refusal = NotFound("No marker is seen.")
         assert await refused(stranger, request_name, **args) == "No marker is seen."
 
@@ -213,27 +213,27 @@ async def test_a_camera_pose_is_set_from_its_picture(tmp_path: Path) -> None:
         await alice.lock(eye)
         bob.take()
 
-        service.go.clear()
+        service.may_answer.clear()
         await alice.ask("CalibrateCamera", id=eye)
         assert [message.get("event") or message["response"] for message in alice.take()] == [
             "CalibrateCamera",
             "ProcessState",
         ]
         assert "calibrated already" in await refused(alice, "CalibrateCamera", id=eye)
-        service.go.set()
-        await happens(bob, "ProcessState", state="finished")
-        assert process(bob, "CameraCalibration") == [("started", False), ("finished", True)]
+        service.may_answer.set()
+        await until_event(bob, "ProcessState", state="finished")
+        assert process_states(bob, "CameraCalibration") == [("started", False), ("finished", True)]
         assert bob.waiting[-1]["data"]["message"] == "It is well known."
         assert bob.names() == ["ProcessState", "SceneObjectChanged/update", "ProcessState"]
-        parameters, images, expected = service.asked[0]
+        parameters, images, expected = service.requests[0]
         assert parameters.cx == 320
         assert len(images) == 3
         assert all(image.startswith(b"\xff\xd8") for image in images)
-        assert expected == Pose(), "where it was placed"
+        assert expected == Pose(), "the pose in the scene"
         placed = stage.services.session.document.scene_object(eye)
         assert placed.pose == FOUND
         raw = await stage.services.online.ask(Pose, eye, "pose")
-        assert raw == FOUND, "the live camera has moved too"
+        assert raw == FOUND, "the online camera was not moved"
         (record,) = await stage.services.calibration_records.find(ListCalibrationsArgs(object_id=eye))
         assert (record.kind, record.person, record.object_name) == (CalibrationKind.CAMERA_POSE, "alice", "eye")
         assert (record.before, record.after, record.residual, record.residual_unit) == (Pose(), FOUND, 0.2, "px")
@@ -242,7 +242,7 @@ async def test_a_camera_pose_is_set_from_its_picture(tmp_path: Path) -> None:
 
         service.refusal = NotFound("No marker is seen.")
         await alice.ask("CalibrateCamera", id=eye)
-        failed = await happens(bob, "ProcessState", state="failed")
+        failed = await until_event(bob, "ProcessState", state="failed")
         assert failed["message"] == "No marker is seen."
         assert bob.names() == ["ProcessState", "ProcessState"]
         await alice.ask("WriteUnlock", object_id=eye)
@@ -259,15 +259,15 @@ async def test_a_camera_without_visible_markers_keeps_its_pose(tmp_path: Path) -
         await stage.start(alice)
         await alice.lock(stage.ids["eye"])
         await alice.ask("CalibrateCamera", id=stage.ids["eye"])
-        failed = await happens(alice, "ProcessState", state="failed")
+        failed = await until_event(alice, "ProcessState", state="failed")
         assert failed["id"] == "CameraCalibration"
         assert "No markers are configured" in failed["message"]
         marker = Marker(7, Pose(Position(0.2, 0, 0)))
         await stage.services.markers.set(CalibrationConfiguration(markers=[marker]))
         alice.take()
         await alice.ask("CalibrateCamera", id=stage.ids["eye"])
-        failed = await happens(alice, "ProcessState", state="failed")
-        assert alice.names() == ["ProcessState", "ProcessState"], "nothing was moved"
+        failed = await until_event(alice, "ProcessState", state="failed")
+        assert alice.names() == ["ProcessState", "ProcessState"], "the camera was moved"
         assert stage.services.session.document.scene_object(stage.ids["eye"]).pose == Pose()
         assert await stage.services.calibration_records.find(ListCalibrationsArgs()) == []
 
@@ -289,9 +289,9 @@ async def test_a_robot_pose_is_set_from_a_camera(tmp_path: Path) -> None:
         alice.take()
         carol.take()
 
-        service.go.clear()
+        service.may_answer.clear()
         await alice.ask("CalibrateRobot", robot_id=arm)  # the first camera of the scene
-        while not service.asked:
+        while not service.requests:
             await asyncio.sleep(0.005)
         assert "lock" in await refused(bob, "WriteLock", object_id=eye), "the camera stays locked until the end"
         assert "is moving" in await refused(alice, "CalibrateRobot", robot_id=arm)
@@ -305,13 +305,13 @@ async def test_a_robot_pose_is_set_from_a_camera(tmp_path: Path) -> None:
             mode="world",
             step=0.1,
         )
-        service.go.set()
-        await happens(carol, "ProcessState", state="finished")
-        assert process(carol, "RobotCalibration") == [("started", False), ("finished", True)]
+        service.may_answer.set()
+        await until_event(carol, "ProcessState", state="finished")
+        assert process_states(carol, "RobotCalibration") == [("started", False), ("finished", True)]
         tasks = [message["data"] for message in carol.waiting if message.get("event") == "TaskState"]
         assert tasks == [], "nobody subscribed to these"
         assert carol.names() == ["ProcessState", "SceneObjectChanged/update", "ProcessState"]
-        view, (depth,), model = service.asked[0]
+        view, (depth,), model = service.requests[0]
         assert [joint.value for joint in view.robot_joints[:3]] == [0, 0, 1], "it moved to its calibration pose"
         assert (model.urdf.name, Path(model.urdf.path).read_bytes()) == ("arm.zip", b"content")
         assert view.robot_pose == Pose()
@@ -326,7 +326,7 @@ async def test_a_robot_pose_is_set_from_a_camera(tmp_path: Path) -> None:
 
         service.refusal = NotFound("The robot is not seen.")
         await alice.ask("CalibrateRobot", robot_id=arm, camera_id=eye, move_to_calibration_pose=False)
-        failed = await happens(alice, "ProcessState", state="failed")
+        failed = await until_event(alice, "ProcessState", state="failed")
         assert failed == {"id": "RobotCalibration", "state": "failed", "message": "The robot is not seen."}
         await bob.lock(eye)
 
@@ -339,7 +339,7 @@ async def test_calibration_records_are_listed_and_compared(tmp_path: Path) -> No
         records = stage.services.calibration_records
 
         def record(
-            date: str, where: Pose | Unset, parent: str = "world", kind: str = "camera_pose"
+            date: str, pose: Pose | Unset, parent: str = "world", kind: str = "camera_pose"
         ) -> CalibrationRecord:
             return CalibrationRecord(
                 CalibrationKind(kind),
@@ -348,19 +348,19 @@ async def test_calibration_records_are_listed_and_compared(tmp_path: Path) -> No
                 "eye",
                 parent,
                 "It is so.",
-                after=where,
+                after=pose,
                 date=f"2026-01-{date}T00:00:00Z",
             )
 
         far, near = record("01", FOUND), record("02", Pose(Position(0.001)))
-        lens, held = record("03", UNSET, kind="intrinsics"), record("04", Pose(), "the flange of arm", "hand_eye")
-        for one in (far, near, lens, held):
+        lens, hand_eye = record("03", UNSET, kind="intrinsics"), record("04", Pose(), "the flange of arm", "hand_eye")
+        for one in (far, near, lens, hand_eye):
             await records.put(one)
         listed = (await stranger.ask("ListCalibrations"))["records"]
-        assert [one["id"] for one in listed] == [held.id, lens.id, near.id, far.id]
+        assert [one["id"] for one in listed] == [hand_eye.id, lens.id, near.id, far.id]
         assert listed[-1]["after"] == msgspec.to_builtins(FOUND)
         for args, expected in (
-            ({"limit": 1}, [held]),
+            ({"limit": 1}, [hand_eye]),
             ({"kind": "camera_pose"}, [near, far]),
             ({"before": "2026-01-02T00:00:00Z"}, [far]),
             ({"object_id": part}, []),
@@ -368,7 +368,7 @@ async def test_calibration_records_are_listed_and_compared(tmp_path: Path) -> No
             found = (await stranger.ask("ListCalibrations", **args))["records"]  # type: ignore[arg-type]
             assert [one["id"] for one in found] == [one.id for one in expected]
 
-        # The pose in the open scene, else a measured pose.
+        # The check uses the pose in the open scene, unless the client sends a measured one.
         check = await stranger.ask("CheckCalibration", id=near.id)
         assert (check["passed"], check["record_id"]) == (True, near.id)
         assert check["distance"] == pytest.approx(0.001)
@@ -377,9 +377,9 @@ async def test_calibration_records_are_listed_and_compared(tmp_path: Path) -> No
         check = await stranger.ask("CheckCalibration", id=far.id, pose=msgspec.to_builtins(FOUND))
         assert (check["passed"], check["distance"]) == (True, 0.0)
         assert (await stranger.ask("CheckCalibration", id=far.id))["passed"] is False
-        assert (await stranger.ask("CheckCalibration", id=held.id, pose={}))["passed"] is True
+        assert (await stranger.ask("CheckCalibration", id=hand_eye.id, pose={}))["passed"] is True
         for args, words in (
-            ({"id": held.id}, "frame of the flange of arm"),
+            ({"id": hand_eye.id}, "frame of the flange of arm"),
             ({"id": lens.id, "pose": {}}, "has no pose that could be checked"),
             ({"id": "cal_none"}, "cal_none"),
             ({"id": near.id, "angle_limit": 0}, "angle_limit"),

@@ -11,10 +11,12 @@ from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until
 from tests.server.protocol.test_protocol_reachability import add, move, point
 
 
-async def action(person: Actor, stage: Stage, name: str, point_id: str, robot: str, orientation: str, how: str) -> str:
+async def action(
+    person: Actor, stage: Stage, name: str, point_id: str, robot: str, orientation: str, move_type: str
+) -> str:
     parameters = [
         {"name": "pose", "type": "pose", "value": msgspec.json.encode(orientation).decode()},
-        {"name": "move_type", "type": "string_enum", "value": msgspec.json.encode(how).decode()},
+        {"name": "move_type", "type": "string_enum", "value": msgspec.json.encode(move_type).decode()},
         {"name": "speed", "type": "double", "value": "0.5"},
         {"name": "acceleration", "type": "double", "value": "1.0"},
     ]

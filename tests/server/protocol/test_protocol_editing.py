@@ -11,7 +11,7 @@ def new_events(actor: Actor) -> list[tuple[str, str | None, str | None, Any]]:
     return [(e["event"], e.get("change_type"), e.get("parent_id"), e.get("data")) for e in actor.events()]
 
 
-async def test_settings_and_models_of_a_scene(tmp_path: Path) -> None:
+async def test_object_settings_and_collision_models_are_changed(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Chooser", "Part", "Plain") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         await stage.place(alice, chooser="Chooser", plain="Plain")
@@ -112,7 +112,7 @@ async def test_orientations_and_joints_are_taught_by_a_robot(tmp_path: Path) -> 
         await alice.ask("WriteUnlock", object_id=orientation["id"])
         bob.take()
 
-        # Joints that an action uses are not removed; unused ones are.
+        # Joints and orientations are removed only by the user who has the lock.
         assert "lock" in await refused(bob, "RemoveActionPointJoints", joints_id=joints["id"])
         await alice.ask("RemoveActionPointJoints", joints_id=joints["id"])
         ((event, change, parent, data),) = new_events(bob)
@@ -124,7 +124,7 @@ async def test_orientations_and_joints_are_taught_by_a_robot(tmp_path: Path) -> 
         assert ([j.name for j in left_over.robot_joints], left_over.orientations) == (["left"], [])
 
 
-async def test_robots_with_several_arms_and_hand_teaching(tmp_path: Path) -> None:
+async def test_robots_list_their_arms_and_switch_hand_teaching(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm", "TwoArms", "DumbArm") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         await stage.place(alice, arm="Arm", two="TwoArms")

@@ -75,22 +75,22 @@ async def test_joints_are_computed_from_the_model_offline(stage: Stage, alice: A
     robot = stage.ids["ur"]
     assert not stage.services.online.online
     joints = await solve(alice, robot)
-    there = await forward(alice, robot, joints)
-    assert there.position.distance_to(TARGET.position) < 1e-6
-    assert there.orientation.angle_to(TARGET.orientation) < 1e-4
+    reached = await forward(alice, robot, joints)
+    assert reached.position.distance_to(TARGET.position) < 1e-6
+    assert reached.orientation.angle_to(TARGET.orientation) < 1e-4
     start = [joint | {"value": joint["value"] - 0.02} for joint in joints]
     near = await solve(alice, robot, start_joints=start)
     assert [joint["value"] for joint in near] == pytest.approx([joint["value"] for joint in joints], abs=1e-4)
 
 
-async def test_scene_objects_are_obstacles(stage: Stage, alice: Actor) -> None:
+async def test_scene_objects_are_obstacles_for_inverse_kinematics(stage: Stage, alice: Actor) -> None:
     robot = stage.ids["ur"]
     crate = await add(alice, stage, "crate", "Crate", Pose(TARGET.position))
     args = {"robot_id": robot, "end_effector_id": "tcp", "pose": msgspec.to_builtins(TARGET)}
     text = await refused(alice, "InverseKinematics", **args)
     assert "only in collision" in text
     assert "crate" in text
-    assert crate not in text, "messages name it as users know it"
+    assert crate not in text, "the message contains the id instead of the name"
     joints = await solve(alice, robot, avoid_collisions=False)
     await alice.ask("RemoveFromScene", id=crate)
     assert await solve(alice, robot) == joints
@@ -122,8 +122,8 @@ async def test_object_settings_change_its_model(stage: Stage, alice: Actor) -> N
     short = await forward(alice, stage.ids["ur"], await solve(alice, stage.ids["ur"]))
     joints = await solve(alice, stage.ids["ur"])
     longer = await add(alice, stage, "longer", "UR5e", BASE, host="127.0.0.98", tcp_z=0.1)
-    there = await forward(alice, longer, joints)
-    assert there.position.distance_to(short.position) == pytest.approx(0.1, abs=1e-6)
+    reached = await forward(alice, longer, joints)
+    assert reached.position.distance_to(short.position) == pytest.approx(0.1, abs=1e-6)
     await alice.ask("RemoveFromScene", id=longer)
 
 
@@ -146,8 +146,8 @@ async def test_kinematics_are_computed_for_a_robot_without_its_own(stage: Stage,
         assert stage.services.online.online
         found = await solve(alice, robot, start_joints=joints)
         assert [joint["value"] for joint in found] == pytest.approx([joint["value"] for joint in joints], abs=1e-4)
-        there = await forward(alice, robot, found)
-        assert there.position.distance_to(TARGET.position) < 1e-6
+        reached = await forward(alice, robot, found)
+        assert reached.position.distance_to(TARGET.position) < 1e-6
         args = {"robot_id": stage.ids["dumb"], "end_effector_id": "tip", "pose": msgspec.to_builtins(TARGET)}
         assert "no model" in await refused(alice, "InverseKinematics", **args)
     finally:

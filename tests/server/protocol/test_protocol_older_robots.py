@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
+from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
 
 
 async def tip_of(actor: Actor, robot: str, **arm: str) -> dict[str, float]:
@@ -19,7 +19,7 @@ async def project(stage: Stage, alice: Actor, **objects: str) -> None:
     await stage.start(alice)
 
 
-async def test_a_robot_with_another_parameter_name_for_the_end_effector(tmp_path: Path) -> None:
+async def test_a_robot_that_names_the_end_effector_differently_is_operated(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "OlderArm") as stage:
         alice = await stage.person("alice")
         await project(stage, alice, arm="OlderArm")
@@ -35,7 +35,7 @@ async def test_a_robot_with_another_parameter_name_for_the_end_effector(tmp_path
 
         # The ordinary stream of poses.
         await alice.ask("RegisterForRobotEvent", robot_id=arm, what="eef_pose", send=True)
-        streamed = await happens(alice, "RobotEef", robot_id=arm)
+        streamed = await until_event(alice, "RobotEef", robot_id=arm)
         (eef,) = streamed["end_effectors"]
         assert (eef["end_effector_id"], eef["pose"]["position"]["x"]) == ("tip", 0.4)
         await alice.ask("RegisterForRobotEvent", robot_id=arm, what="eef_pose", send=False)
@@ -50,7 +50,7 @@ async def test_a_robot_with_another_parameter_name_for_the_end_effector(tmp_path
         step: dict[str, Any] = {"robot_id": arm, "end_effector_id": "tip", "axis": "x", "what": "position"}
         await alice.lock(arm)
         await alice.ask("StepRobotEef", **step, mode="world", step=0.05)
-        await happens(alice, "RobotMoveToPose", move_event_type="end")
+        await until_event(alice, "RobotMoveToPose", move_event_type="end")
         assert (await tip_of(alice, arm))["x"] == 0.45
 
         # Motion while a button is held.
@@ -61,7 +61,7 @@ async def test_a_robot_with_another_parameter_name_for_the_end_effector(tmp_path
         await alice.ask("JogRobot", **held | {"valid_ms": 0})
 
 
-async def test_a_robot_with_another_parameter_name_for_the_arm(tmp_path: Path) -> None:
+async def test_a_robot_that_names_the_arm_differently_is_operated(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "OlderArms") as stage:
         alice = await stage.person("alice")
         await project(stage, alice, robot="OlderArms")
@@ -77,11 +77,11 @@ async def test_a_robot_with_another_parameter_name_for_the_arm(tmp_path: Path) -
         assert (await tip_of(alice, robot, arm_id="right"))["y"] == -0.5
 
         await alice.ask("RegisterForRobotEvent", robot_id=robot, what="eef_pose", send=True)
-        streamed = await happens(alice, "RobotEef", robot_id=robot)
+        streamed = await until_event(alice, "RobotEef", robot_id=robot)
         places = {eef["arm_id"]: eef["pose"]["position"]["y"] for eef in streamed["end_effectors"]}
         assert places == {"left": 0.5, "right": -0.5}
         await alice.ask("RegisterForRobotEvent", robot_id=robot, what="joints", send=True)
-        both = await happens(alice, "RobotJoints", robot_id=robot)
+        both = await until_event(alice, "RobotJoints", robot_id=robot)
         assert [joint["name"] for joint in both["joints"]] == ["left_1", "right_1"]
 
         await alice.ask("AddApUsingRobot", robot_id=robot, end_effector_id="tip", arm_id="right", name="here")

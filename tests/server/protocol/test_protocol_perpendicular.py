@@ -10,7 +10,7 @@ import pytest
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_server.online.perpendicular import CHECKED_YAWS, DOWN, joint_change, yaw_of, yaws
-from tests.server.protocol.stage import happens, open_stage, refused
+from tests.server.protocol.stage import open_stage, refused, until_event
 
 
 @pytest.mark.parametrize("yaw", [-3.0, -0.5, 0.0, 0.25, 3.1])
@@ -41,8 +41,8 @@ async def test_a_tool_is_turned_down_with_the_smallest_change(tmp_path: Path) ->
         assert "lock" in await refused(alice, "SetEefPerpendicularToWorld", **args)
         for name in ("arm", "dumb", "part"):
             await alice.lock(stage.ids[name])
-        for name, why in (("part", "not a robot"), ("dumb", "inverse kinematics")):
-            assert why in await refused(alice, "SetEefPerpendicularToWorld", **args | {"robot_id": stage.ids[name]})
+        for name, reason in (("part", "not a robot"), ("dumb", "inverse kinematics")):
+            assert reason in await refused(alice, "SetEefPerpendicularToWorld", **args | {"robot_id": stage.ids[name]})
         assert "one arm" in await refused(alice, "SetEefPerpendicularToWorld", **args, arm_id="left")
         assert "speed" in await refused(alice, "SetEefPerpendicularToWorld", **args | {"speed": 0.0})
         assert "no end effector" in await refused(
@@ -60,18 +60,18 @@ async def test_a_tool_is_turned_down_with_the_smallest_change(tmp_path: Path) ->
         await alice.ask("SetEefPerpendicularToWorld", dry_run=True, **args)
         assert bob.events() == []
         await alice.ask("SetEefPerpendicularToWorld", **args)
-        end = await happens(bob, "RobotMoveToPose", move_event_type="end")
+        end = await until_event(bob, "RobotMoveToPose", move_event_type="end")
         assert [event["data"]["move_event_type"] for event in bob.events()] == ["start", "end"]
         target = msgspec.convert(end["target_pose"], Pose)
         assert target.position == Position(0.3, 0.2, 0.1)
         assert Position(0, 0, 1).rotated(target.orientation).distance_to(Position(0, 0, -1)) < 1e-9
         # The joints of this arm are position and rotation vector. No other angle of the circle changes them less.
-        here = tilted.rotation_vector()
-        change = _distance(here, target.orientation)
+        current = tilted.rotation_vector()
+        change = _distance(current, target.orientation)
         assert change < 1.0
         for degree in range(360):
             other = Orientation.from_rotation_vector(0, 0, math.radians(degree)) * DOWN
-            assert _distance(here, other) > change - 0.02
+            assert _distance(current, other) > change - 0.02
         assert not stage.services.online.moving
 
         # The caller holds the lock before and after.
@@ -80,8 +80,8 @@ async def test_a_tool_is_turned_down_with_the_smallest_change(tmp_path: Path) ->
         assert "below the floor" in await refused(alice, "SetEefPerpendicularToWorld", **args)
 
 
-def _distance(here: tuple[float, ...], orientation: Orientation) -> float:
+def _distance(current: tuple[float, ...], orientation: Orientation) -> float:
     """Return the change of the arm's joints. A rotation has two vectors: the short one and the long one."""
     short = orientation.rotation_vector()
     long = tuple(value * (1 - 2 * math.pi / math.hypot(*short)) for value in short)
-    return min(sum(abs(a - b) for a, b in zip(here, way, strict=True)) for way in (short, long))
+    return min(sum(abs(a - b) for a, b in zip(current, vector, strict=True)) for vector in (short, long))

@@ -40,8 +40,8 @@ async def point(person: Actor, stage: Stage, name: str, x: float, y: float, z: f
     await person.lock(added.id)
     await person.ask("AddActionPointOrientation", action_point_id=added.id, orientation=DOWN)
     await person.ask("WriteUnlock", object_id=added.id)
-    (with_it,) = [each for each in stage.services.session.require_project().action_points if each.name == name]
-    return added.id, with_it.orientations[0].id
+    (updated,) = [each for each in stage.services.session.require_project().action_points if each.name == name]
+    return added.id, updated.orientations[0].id
 
 
 async def move(person: Actor, point_id: str, x: float, y: float, z: float) -> None:
@@ -70,7 +70,7 @@ async def prepared(stage: Stage, alice: Actor) -> str:
     return robot
 
 
-async def test_reachability_is_announced_and_follows_edits(tmp_path: Path) -> None:
+async def test_reachability_is_published_and_follows_edits(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice, bob, carol = await stage.person("alice"), await stage.person("bob"), await stage.person()
         assert "is open" in await refused(alice, "Reachability")
@@ -144,7 +144,7 @@ async def _add_joints(stage: Stage, point_id: str, robot: str, joints: list[Join
     return "jnt_kept"
 
 
-LED = """
+JOINT_ARM = """
 from .arm import Arm
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
@@ -152,7 +152,7 @@ from arcor2_hw.data.robot import Joint
 NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 
 
-class Led(Arm):
+class JointArm(Arm):
     _ABSTRACT = False
     urdf_package_name = "ur5e.zip"
 
@@ -174,10 +174,10 @@ class Led(Arm):
 async def test_two_arms_are_obstacles_for_each_other(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
-        await stage.services.types.add(ObjectTypeSource("Led", LED.lstrip()))
+        await stage.services.types.add(ObjectTypeSource("JointArm", JOINT_ARM.lstrip()))
         await alice.ask("NewScene", name="scene")
-        await add(alice, stage, "arm", "Led", Pose())
-        other = await add(alice, stage, "other", "Led", Pose(Position(0, 1, 0)))
+        await add(alice, stage, "arm", "JointArm", Pose())
+        other = await add(alice, stage, "other", "JointArm", Pose(Position(0, 1, 0)))
         await alice.ask("SaveScene")
         await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
         _, between = await point(alice, stage, "between", 0.134, 0.492, 0.488)
@@ -185,7 +185,7 @@ async def test_two_arms_are_obstacles_for_each_other(tmp_path: Path) -> None:
         await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
 
         async def reach(expected: dict[str, str]) -> dict[str, str]:
-            """Wait until these results have been announced. Return the reasons."""
+            """Wait until these results have been published. Return the reasons."""
             found: dict[str, str] = {}
             async with asyncio.timeout(PATIENCE):
                 while found != expected:
@@ -202,7 +202,7 @@ async def test_two_arms_are_obstacles_for_each_other(tmp_path: Path) -> None:
         reasons = await reach(free | {stage.ids["arm"]: "in_collision"})
         assert "arm/wrist" in reasons[stage.ids["arm"]]
         assert "other/wrist" in reasons[stage.ids["arm"]]
-        assert latest_results(bob) == {between: "in_collision"}, "nobody edited anything"
+        assert latest_results(bob) == {between: "in_collision"}, "without an edit"
         await alice.ask("MoveToJoints", robot_id=other, speed=1.0, joints=joints)
         await reach(free)
         await alice.ask("MoveToJoints", robot_id=other, speed=1.0, joints=[joints[0] | {"value": -1.57}, *joints[1:]])
@@ -238,10 +238,10 @@ async def test_a_gripped_part_is_an_obstacle_online(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         crate = ObjectModel.of(Box("Crate", 0.2, 0.2, 0.2))
-        for kind, source, model in (("Led", LED, UNSET), ("Claw", CLAW, UNSET), ("Crate", CRATE, crate)):
+        for kind, source, model in (("JointArm", JOINT_ARM, UNSET), ("Claw", CLAW, UNSET), ("Crate", CRATE, crate)):
             await stage.services.types.add(ObjectTypeSource(kind, source.lstrip(), model=model))
         await alice.ask("NewScene", name="scene")
-        robot = await add(alice, stage, "arm", "Led", Pose())
+        robot = await add(alice, stage, "arm", "JointArm", Pose())
         await add(alice, stage, "crate", "Crate", Pose(Position(0.134, 0.492, 0.238)))
         await alice.ask("AddObjectToScene", name="claw", type="Claw", parameters=[])
         stage.ids |= {obj.name: obj.id for obj in stage.services.session.require_scene().objects}

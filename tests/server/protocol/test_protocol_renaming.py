@@ -1,4 +1,4 @@
-"""Projects open and run although an object type renamed an action or parameter, or although they come from ARCOR2."""
+"""Projects with former names of actions and parameters, or from ARCOR2, open and run."""
 
 from pathlib import Path
 from typing import Any
@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from arcor2_hw.data.project import Action, Project
-from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
+from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
 
 FLOW = {"type": "default", "outputs": ["number"]}
 
@@ -18,7 +18,7 @@ def calls(project: Project) -> list[tuple[str, list[tuple[str, str]]]]:
     return [(one.type.partition("/")[2], [(p.name, p.value) for p in one.parameters]) for one in actions]
 
 
-async def opened(stage: Stage, alice: Actor) -> str:
+async def open_project(stage: Stage, alice: Actor) -> str:
     """Open a project on a scene with a source of random numbers; return its action point."""
     await stage.place(alice, rnd="RandomActions")
     await alice.ask("SaveScene")
@@ -36,7 +36,7 @@ async def add(stage: Stage, alice: Actor, point: str, name: str, method: str, **
     return stage.services.session.require_project().action_points[0].actions[-1].id
 
 
-NOW = [
+CURRENT_CALLS = [
     ("random_int", [("range_min", "3"), ("range_max", "3")]),
     ("random_double", [("range_min", "0.5"), ("range_max", "0.5")]),
 ]
@@ -45,17 +45,17 @@ NOW = [
 @pytest.mark.parametrize(
     ("whole", "low", "high"),
     [("random_integer", "minimum", "maximum"), ("random_int", "range_min", "range_max")],
-    ids=["ours before", "ARCOR2"],
+    ids=["former", "ARCOR2"],
 )
 async def test_a_saved_project_opens_builds_and_runs(tmp_path: Path, whole: str, low: str, high: str) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         session, storage = stage.services.session, stage.services.storage
-        point = await opened(stage, alice)
+        point = await open_project(stage, alice)
         # Requests may also use the former names.
         draw = await add(stage, alice, point, "draw", whole, **{low: 3, high: 3})
         await add(stage, alice, point, "part", "random_double", **{low: 0.5, high: 0.5})
-        assert calls(session.require_project()) == NOW
+        assert calls(session.require_project()) == CURRENT_CALLS
         await alice.ask("AddLogicItem", start="START", end=draw)
         await alice.ask("AddLogicItem", start=draw, end="END")
         await alice.ask("SaveProject")
@@ -84,17 +84,17 @@ async def test_a_saved_project_opens_builds_and_runs(tmp_path: Path, whole: str,
         # A script written by a user may still call the action by its former name.
         script.write_text(script.read_text().replace(call, f'rnd.{whole}({low}=3, {high}=3, an="draw")'))
         await alice.ask("RunPackage", id=package)
-        assert (await happens(alice, "ActionStateAfter"))["results"] == ["3"]
+        assert (await until_event(alice, "ActionStateAfter"))["results"] == ["3"]
         await alice.ask("StopPackage")
-        await happens(alice, "PackageState", state="stopped")
+        await until_event(alice, "PackageState", state="stopped")
         alice.take()
         await alice.ask("OpenProject", id=saved.id)
-        event = await happens(alice, "OpenProject")
-        assert calls(msgspec.convert(event["project"], Project)) == NOW
+        event = await until_event(alice, "OpenProject")
+        assert calls(msgspec.convert(event["project"], Project)) == CURRENT_CALLS
         assert not session.has_changes
         await stage.start(alice)
         await alice.ask("ExecuteAction", action_id=draw)
-        assert (await happens(alice, "ActionResult"))["results"] == ["3"]
+        assert (await until_event(alice, "ActionResult"))["results"] == ["3"]
         twice = [{"name": name, "type": "integer", "value": "3"} for name in ("minimum", "range_min")]
         await alice.lock(draw)
         assert "given twice" in await refused(alice, "UpdateAction", action_id=draw, parameters=twice)

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from arcor2_hw.data.object_type import ObjectTypeSource
-from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
+from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
 
 LOGIC = """
 from arcor2.data.common import ActionMetadata
@@ -68,13 +68,13 @@ async def run(alice: Actor, package: str) -> list[str]:
     """Run a package and return the results of its first action."""
     alice.take()
     await alice.ask("RunPackage", id=package)
-    results: list[str] = (await happens(alice, "ActionStateAfter"))["results"]
+    results: list[str] = (await until_event(alice, "ActionStateAfter"))["results"]
     return results
 
 
 async def stop(alice: Actor) -> None:
     await alice.ask("StopPackage")
-    await happens(alice, "PackageState", state="stopped")
+    await until_event(alice, "PackageState", state="stopped")
 
 
 async def test_documents_use_the_type_that_shadows_an_installed_one(tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ async def test_documents_use_the_type_that_shadows_an_installed_one(tmp_path: Pa
         assert await problems(alice, project_id) == []
         events = [event for event in alice.events() if event["event"] == "ChangedObjectTypes"]
         assert [(event["change_type"], event["data"][0]["built_in"]) for event in events] == [("update", True)]
-        assert (await happens(alice, "ActionStateAfter"))["results"] == ["true"]
+        assert (await until_event(alice, "ActionStateAfter"))["results"] == ["true"]
         await stop(alice)
         await alice.ask("OpenProject", id=project_id)
 

@@ -82,7 +82,7 @@ async def enter(stage: Stage, alice: Actor, state: str) -> None:
     alice.take()
 
 
-async def test_every_request_in_every_state(tmp_path: Path) -> None:
+async def test_every_answer_in_every_state_equals_the_recorded_one(tmp_path: Path) -> None:
     wrong: dict[str, str] = {}
     async with open_stage(tmp_path, lock_retries=1, lock_retry_wait=0.01) as stage:
         alice, stranger = await stage.person("alice"), await stage.person()

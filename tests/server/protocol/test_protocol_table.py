@@ -34,12 +34,12 @@ GRANTED = {
     "CameraColorParameters": f"{CAMERAS}::test_a_camera_returns_its_picture_and_parameters",
     "CancelAction": f"{ONLINE}::test_a_single_action_can_be_cancelled",
     "DeleteOverride": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
-    "GetCameraPose": f"{CAMERAS}::test_client_pictures_are_calibrated_by_the_service",
+    "GetCameraPose": f"{CAMERAS}::test_pictures_of_a_client_are_evaluated_by_the_service",
     "GetProject": f"{EDITING}::test_logic_items_are_changed",
-    "GetRobotArms": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
-    "GetScene": f"{EDITING}::test_settings_and_models_of_a_scene",
-    "HandTeachingMode": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
-    "MarkersCorners": f"{CAMERAS}::test_client_pictures_are_calibrated_by_the_service",
+    "GetRobotArms": f"{EDITING}::test_robots_list_their_arms_and_switch_hand_teaching",
+    "GetScene": f"{EDITING}::test_object_settings_and_collision_models_are_changed",
+    "HandTeachingMode": f"{EDITING}::test_robots_list_their_arms_and_switch_hand_teaching",
+    "MarkersCorners": f"{CAMERAS}::test_pictures_of_a_client_are_evaluated_by_the_service",
     "ObjectAimingAddPoint": f"{AIMING}::test_an_object_is_aimed_by_its_focus_points",
     "ObjectAimingCancel": f"{AIMING}::test_an_object_is_aimed_by_its_focus_points",
     "ObjectAimingDone": f"{AIMING}::test_an_object_is_aimed_by_its_focus_points",
@@ -62,16 +62,16 @@ GRANTED = {
     "StopRobot": f"{ONLINE}::test_stop_robot_stops_the_motion",
     "UpdateActionPointOrientationUsingRobot": f"{EDITING}::test_orientations_and_joints_are_taught_by_a_robot",
     "UpdateLogicItem": f"{EDITING}::test_logic_items_are_changed",
-    "UpdateObjectModel": f"{EDITING}::test_settings_and_models_of_a_scene",
-    "UpdateObjectParameters": f"{EDITING}::test_settings_and_models_of_a_scene",
+    "UpdateObjectModel": f"{EDITING}::test_object_settings_and_collision_models_are_changed",
+    "UpdateObjectParameters": f"{EDITING}::test_object_settings_and_collision_models_are_changed",
     "UpdateOverride": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
     "UploadPackage": f"{RUNNING}::test_packages_are_uploaded_renamed_and_deleted",
 }
 """Tests of the effect and events of requests that no recorded session grants."""
 
 REFUSED = {
-    "GetCameraPose": f"{CAMERAS}::test_client_pictures_are_calibrated_by_the_service",
-    "MarkersCorners": f"{CAMERAS}::test_client_pictures_are_calibrated_by_the_service",
+    "GetCameraPose": f"{CAMERAS}::test_pictures_of_a_client_are_evaluated_by_the_service",
+    "MarkersCorners": f"{CAMERAS}::test_pictures_of_a_client_are_evaluated_by_the_service",
     "PausePackage": f"{RUNNING}::test_each_run_state_allows_its_requests",
     "RegisterUser": f"{ON_THE_WIRE}::test_a_user_name_is_unique",
     "RenamePackage": f"{RUNNING}::test_packages_are_uploaded_renamed_and_deleted",
@@ -84,11 +84,11 @@ REFUSED = {
 
 NEVER_REFUSED = {"GetObjectTypes", "GetRobotMeta", "ListPackages", "ListProjects", "ListScenes", "ObjectTypeUsage",
                  "SystemInfo"}  # fmt: skip
-"""Requests without arguments that could be invalid, and which need nothing."""
+"""Requests without arguments and without preconditions."""
 
 SENT = {
     "ActionCancelled": f"{ONLINE}::test_a_single_action_can_be_cancelled",
-    "HandTeachingMode": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
+    "HandTeachingMode": f"{EDITING}::test_robots_list_their_arms_and_switch_hand_teaching",
     "OverrideUpdated": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
     "ProcessState": f"{CAMERAS}::test_a_camera_pose_is_set_from_its_picture",
     "ProjectException": f"{RUNNING}::test_a_script_error_is_reported",
@@ -148,12 +148,12 @@ def test_the_named_test_expects_a_refusal(name: str, test: str) -> None:
 
 
 def test_every_request_has_a_test_of_its_effect() -> None:
-    granted = recorded()[0] | GRANTED.keys() | CHECKED_BY_ITSELF
+    granted = recorded()[0] | GRANTED.keys() | CHECKED_SEPARATELY
     assert set(PROTOCOL["requests"]) - granted == set()
     assert GRANTED.keys() & recorded()[0] == set(), "the recorded sessions show these already"
 
 
-CHECKED_BY_ITSELF = {"GetActions", "GetObjectTypes", "GetRobotMeta", "SystemInfo"}
+CHECKED_SEPARATELY = {"GetActions", "GetObjectTypes", "GetRobotMeta", "SystemInfo"}
 """Requests whose recorded answers differ on purpose. The comparison of the sessions checks what must be the same."""
 
 

@@ -9,13 +9,13 @@ import pytest
 
 from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.exceptions import StorageError
-from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused, until
+from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until, until_event
 
 CLOSED = ["ProjectClosed", "PackageChanged/add", "PackageState started", "PackageState running", "PackageInfo"]
 OPENED = ["PackageState stopping", "PackageState stopped", "PackageChanged/remove", "OpenProject"]
 
 
-def story(actor: Actor) -> list[str]:
+def event_summary(actor: Actor) -> list[str]:
     """Return a summary of the events, without the single actions."""
     events = []
     for event in actor.events():
@@ -65,7 +65,7 @@ async def test_a_project_runs_and_is_reopened(tmp_path: Path) -> None:
         # No user has to be registered for it.
         await stranger.ask("TemporaryPackage")
         assert "response" in stranger.take()[0], "the answer comes before all events"
-        before = await happens(bob, "ActionStateBefore")
+        before = await until_event(bob, "ActionStateBefore")
         assert before == {"action_id": action, "parameters": ["0.05"]}
         (package,) = await alice.ask("ListPackages")
         assert package["package_meta"]["name"] == "Temporary package for project 'round'."
@@ -79,10 +79,10 @@ async def test_a_project_runs_and_is_reopened(tmp_path: Path) -> None:
             with pytest.raises(Exception, match=r"run|program"):
                 await alice.ask(name, **args)
         await alice.ask("StopPackage")
-        again = await happens(bob, "OpenProject")
+        again = await until_event(bob, "OpenProject")
         assert again["project"]["id"] == saved.id
         assert len(again["project"]["action_points"]) == 2
-        assert story(bob) == CLOSED + OPENED
+        assert event_summary(bob) == CLOSED + OPENED
         assert await alice.ask("ListPackages") == []
         assert not stage.services.session.has_changes
         assert (await alice.ask("Undo"))["request"] == "AddActionPoint", "the history continues after a run"
@@ -96,14 +96,14 @@ async def test_an_online_scene_is_online_again_after_the_run(tmp_path: Path) -> 
         action = await project(stage, alice)
         await stage.start(alice)
         await alice.ask("TemporaryPackage", start_paused=True)
-        await happens(alice, "PackageState", state="paused")
+        await until_event(alice, "PackageState", state="paused")
         await alice.ask("StepAction")
-        await happens(alice, "ActionStateAfter", action_id=action)
+        await until_event(alice, "ActionStateAfter", action_id=action)
         await until(lambda: stage.services.execution.state.value == "paused")
         await alice.ask("StopPackage")
-        await happens(alice, "OpenProject")
-        await happens(alice, "SceneState", state="started")
-        events = story(alice)
+        await until_event(alice, "OpenProject")
+        await until_event(alice, "SceneState", state="started")
+        events = event_summary(alice)
         assert events[:3] == ["SceneState stopping", "SceneState stopped", "ProjectClosed"]
         assert events[-3:] == ["OpenProject", "SceneState starting", "SceneState started"]
         assert "ShowMainScreen" not in events
@@ -116,24 +116,24 @@ async def test_the_project_is_reopened_when_its_program_cannot_start(tmp_path: P
         await project(stage, alice)
         alice.take()
         await alice.ask("TemporaryPackage", breakpoints=["acp_none"])
-        await happens(alice, "OpenProject")
-        events = story(alice)
+        await until_event(alice, "OpenProject")
+        events = event_summary(alice)
         assert "ProjectException" in events
         assert events[-3:] == ["PackageState stopped", "PackageChanged/remove", "OpenProject"]
         await alice.ask("CloseProject")
 
 
-async def test_a_project_deleted_during_the_run_leads_to_the_list(tmp_path: Path) -> None:
+async def test_after_a_run_a_deleted_project_leads_to_the_list_of_projects(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         await project(stage, alice)
         key = stage.services.session.require_project().id
         await alice.ask("TemporaryPackage", start_paused=True)
-        await happens(alice, "PackageState", state="paused")
+        await until_event(alice, "PackageState", state="paused")
         await alice.ask("DeleteProject", id=key)
         alice.take()
         await alice.ask("StopPackage")
-        screen = await happens(alice, "ShowMainScreen")
+        screen = await until_event(alice, "ShowMainScreen")
         assert screen == {"what": "ProjectsList", "highlight": key}
         await until(lambda: not stage.services.execution.busy)
         await alice.ask("NewScene", name="next")
@@ -152,12 +152,12 @@ async def test_a_project_that_cannot_be_built_stays_open(tmp_path: Path, monkeyp
             assert await refused(alice, "TemporaryPackage") == "The disk is full."
         assert stage.services.session.project is not None
         assert not stage.services.execution.busy
-        # Four at once: one of them runs it, the others are refused.
+        # Of three simultaneous requests, one runs the project and the others are refused.
         outcomes = await asyncio.gather(*(alice.ask("TemporaryPackage") for _ in range(3)), return_exceptions=True)
         assert sum(outcome is None for outcome in outcomes) == 1
-        await happens(alice, "PackageState", state="running")
+        await until_event(alice, "PackageState", state="running")
         await alice.ask("StopPackage")
-        await happens(alice, "OpenProject")
+        await until_event(alice, "OpenProject")
 
 
 async def test_a_server_ended_during_the_run_leaves_no_package_and_reopens_the_project(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ async def test_a_server_ended_during_the_run_leaves_no_package_and_reopens_the_p
         alice = await stage.person("alice")
         await project(stage, alice)
         await alice.ask("TemporaryPackage")
-        await happens(alice, "ActionStateBefore")
+        await until_event(alice, "ActionStateBefore")
         packages = stage.services.settings.packages_dir
         assert len(list(packages.glob("pkg_*"))) == 1
     assert list(packages.glob("pkg_*")) == []
@@ -176,22 +176,22 @@ async def test_a_server_ended_during_the_run_leaves_no_package_and_reopens_the_p
 
 async def test_a_server_killed_during_the_run_cleans_up_at_its_next_start(tmp_path: Path) -> None:
     """A kill or a power cut leaves the directory as it is during a run."""
-    left, data = tmp_path / "left", tmp_path / "data"
+    copied, data = tmp_path / "copied", tmp_path / "data"
     data.mkdir()
     async with open_stage(data) as stage:
         alice = await stage.person("alice")
         await project(stage, alice)
         await alice.ask("TemporaryPackage")
-        await happens(alice, "ActionStateBefore")
+        await until_event(alice, "ActionStateBefore")
         await until(lambda: stage.services.runs._writing is None)  # the data on the disk matter here
-        await asyncio.to_thread(shutil.copytree, data, left)
-    packages = left / "packages"
+        await asyncio.to_thread(shutil.copytree, data, copied)
+    packages = copied / "packages"
     (package,) = packages.glob("pkg_*")
     for unfinished in (".new-x", ".old-y", f".{package.name}-z"):
         (packages / unfinished).mkdir()
     kept = packages / "pkg_kept"
     shutil.copytree(package, kept)
-    async with open_stage(left) as stage:
+    async with open_stage(copied) as stage:
         opened = stage.services.session.require_project()
         assert (opened.name, stage.services.session.has_changes) == ("round", False)
         assert list(packages.iterdir()) == [kept]

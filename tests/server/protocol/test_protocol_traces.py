@@ -31,7 +31,7 @@ CONTINUAL = {"RobotJoints", "RobotEef", "ActionStateBefore", "ActionStateAfter"}
 DIFFERENT = {
     3: "SystemInfo lists our own requests too",
     4: "GetObjectTypes: other types are installed here",
-    5: "GetActions: the robot's other actions are the driver's business",
+    5: "GetActions: the installed driver has other actions",
     6: "GetRobotMeta: other robots are installed here",
     10: "the original never answered ListMeshes",
     63: "MoveToJoints always failed (Q9)",
@@ -50,16 +50,16 @@ Messages = dict[str, list[dict[str, Any]]]
 class Exchange:
     """A request with all messages that every client got before the next request."""
 
-    def __init__(self, who: str, request: dict[str, Any]) -> None:
-        self.who = who
+    def __init__(self, client: str, request: dict[str, Any]) -> None:
+        self.client = client
         self.request = request
         self.received: Messages = {"A": [], "B": [], "C": []}
 
-    def compared(self, who: str) -> list[dict[str, Any]]:
-        return [message for message in self.received[who] if message.get("event") not in CONTINUAL]
+    def compared(self, client: str) -> list[dict[str, Any]]:
+        return [message for message in self.received[client] if message.get("event") not in CONTINUAL]
 
 
-NOTHING = "NO RESPONSE TO"
+NO_RESPONSE = "NO RESPONSE TO"
 """Placeholder in a recorded session where nothing was sent."""
 REFUSED = ("b3", "b3_copy")
 """The action that request 103 adds to the recorded project but not to ours, and its copy."""
@@ -69,7 +69,7 @@ def without_refused(value: Any) -> Any:
     """Remove the additions of the refused action from a recorded message."""
     match value:
         case {"event": _, "data": {"name": name}} if name in REFUSED:
-            return {NOTHING: name}
+            return {NO_RESPONSE: name}
         case dict():
             return {key: without_refused(item) for key, item in value.items()}
         case list():
@@ -81,11 +81,11 @@ def without_refused(value: Any) -> Any:
 def exchanges(name: str) -> Iterator[Exchange]:
     found: list[Exchange] = []
     for line in session(name):
-        who, message = line["who"][0], without_refused(line["msg"])
+        client, message = line["who"][0], without_refused(line["msg"])
         if line["who"].endswith(">"):
-            found.append(Exchange(who, message))
-        elif found and NOTHING not in message:
-            found[-1].received[who].append(message)
+            found.append(Exchange(client, message))
+        elif found and NO_RESPONSE not in message:
+            found[-1].received[client].append(message)
     for before, after in itertools.pairwise(found):
         # B sometimes received just after the request a message that A received before it.
         while (
@@ -118,7 +118,7 @@ def comparable(value: Any, key: str = "") -> Any:
     return value
 
 
-def same(messages: list[dict[str, Any]]) -> Any:
+def normalized(messages: list[dict[str, Any]]) -> Any:
     return plain(comparable(messages))
 
 
@@ -163,9 +163,9 @@ class Replay:
     async def play(self, name: str) -> None:
         for exchange in exchanges(name):
             number = exchange.request["id"]
-            self.answers[number] = await self.people[exchange.who].send(self.mapping.to_ours(exchange.request))
-            for who, person in self.people.items():
-                await self._compare(exchange, who, person)
+            self.answers[number] = await self.people[exchange.client].send(self.mapping.to_ours(exchange.request))
+            for client, person in self.people.items():
+                await self._compare(exchange, client, person)
             if exchange.received["C"]:
                 late = Actor(self.stage)  # type: ignore[arg-type]
                 try:
@@ -173,38 +173,38 @@ class Replay:
                 finally:
                     await late.leave()
 
-    async def _compare(self, exchange: Exchange, who: str, person: Actor) -> None:
-        number, expected = exchange.request["id"], exchange.compared(who)
+    async def _compare(self, exchange: Exchange, client: str, person: Actor) -> None:
+        number, expected = exchange.request["id"], exchange.compared(client)
 
         def got() -> list[dict[str, Any]]:
             return [message for message in person.waiting if message.get("event") not in CONTINUAL]
 
         def is_equal() -> bool:
-            wanted = {message["event"] for message in exchange.received[who] if message.get("event") in CONTINUAL}
+            wanted = {message["event"] for message in exchange.received[client] if message.get("event") in CONTINUAL}
             return wanted <= {message.get("event") for message in person.waiting}
 
         try:
             async with asyncio.timeout(0.5 if number in DIFFERENT else None):
-                await until(lambda: len(got()) >= len(expected) and (who == "C" or is_equal()))
+                await until(lambda: len(got()) >= len(expected) and (client == "C" or is_equal()))
         except TimeoutError:
             if number not in DIFFERENT:
-                raise AssertionError(f"{who} at {exchange.request}: {got()} instead of {expected}") from None
-        self.continual.setdefault(number, {})[who] = [m for m in person.waiting if m.get("event") in CONTINUAL]
+                raise AssertionError(f"{client} at {exchange.request}: {got()} instead of {expected}") from None
+        self.continual.setdefault(number, {})[client] = [m for m in person.waiting if m.get("event") in CONTINUAL]
         ours = in_order(exchange, [message for message in person.take() if message.get("event") not in CONTINUAL])
         expected = in_order(exchange, expected)
         self.mapping.learn(expected, ours)
         if number not in DIFFERENT:
-            difference = first_difference(same(ours), same(self.mapping.to_ours(expected)))
-            assert not difference, f"{who} at {exchange.request}: {difference}"
+            difference = first_difference(normalized(ours), normalized(self.mapping.to_ours(expected)))
+            assert not difference, f"{client} at {exchange.request}: {difference}"
             self.compared += len(ours)
 
 
-async def test_all_recorded_sessions_give_the_same_messages(tmp_path: Path) -> None:
+async def test_all_recorded_sessions_result_in_the_same_messages(tmp_path: Path) -> None:
     async with open_stage(tmp_path, streaming_period=0.02) as stage:
         for upload in uploads():
             meta = await stage.services.types.add(upload)
             assert not meta.disabled, meta.problem
-        people = {who: await stage.newcomer() for who in "AB"}
+        people = {client: await stage.newcomer() for client in "AB"}
         await until(lambda: all(person.waiting for person in people.values()))
         first = session("01_connect_register")[0]
         assert people["A"].take() == [first["msg"]]
@@ -212,7 +212,7 @@ async def test_all_recorded_sessions_give_the_same_messages(tmp_path: Path) -> N
         for name in SESSIONS:
             await replay.play(name)
         assert replay.compared == 472
-        check_what_differs(replay)
+        check_different_answers(replay)
         check_streams(replay)
         check_programs(replay)
 
@@ -221,7 +221,7 @@ def _recorded(name: str, number: int) -> dict[str, Any]:
     return next(line["msg"] for line in session(name) if line["msg"].get("id") == number and "response" in line["msg"])
 
 
-def check_what_differs(replay: Replay) -> None:
+def check_different_answers(replay: Replay) -> None:
     """Check answers that differ on purpose: the common part must be equal, or our answer better."""
     first = SESSIONS[0]
     ours, theirs = replay.answers[3]["data"], _recorded(first, 3)["data"]
@@ -231,7 +231,7 @@ def check_what_differs(replay: Replay) -> None:
     metas = {meta["type"]: meta for meta in replay.answers[4]["data"]}
     for meta in _recorded(first, 4)["data"]:
         if meta["built_in"] or meta["type"] == "WeighingMachine":
-            assert same([metas[meta["type"]]]) == same([meta])
+            assert normalized([metas[meta["type"]]]) == normalized([meta])
     moves = {action["name"]: action for action in replay.answers[5]["data"]}
     for action in _recorded(first, 5)["data"]:
         if action["name"] in ("move", "update_pose"):
@@ -262,7 +262,7 @@ def check_streams(replay: Replay) -> None:
             line["msg"] for line in session(SESSIONS[2]) if line["msg"].get("event") == event and line["who"] == "A<"
         )
         ours = [message for message in received["A"] if message["event"] == event]
-        assert same([ours[0]]) == same([replay.mapping.to_ours(recorded)])
+        assert normalized([ours[0]]) == normalized([replay.mapping.to_ours(recorded)])
         assert received["B"] == []
     assert replay.continual[70]["A"] == [], "nothing is sent after the subscription ends"
 
@@ -276,10 +276,10 @@ def check_programs(replay: Replay) -> None:
             if line["msg"].get("event") == "ActionStateBefore"
             for data in [line["msg"]["data"]]
         }
-        for who in "AB":
-            received = [message for number in numbers for message in replay.continual[number][who]]
+        for client in "AB":
+            received = [message for number in numbers for message in replay.continual[number][client]]
             actions = [m for m in received if m["event"].startswith("ActionState")]
-            assert actions, who
+            assert actions, client
             for before, after in zip(actions[::2], actions[1::2], strict=False):
                 assert (before["event"], after["event"]) == ("ActionStateBefore", "ActionStateAfter")
                 assert before["data"]["action_id"] == after["data"]["action_id"]

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
+from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
 
 
 def parent(name: str, value: Any) -> dict[str, str]:
@@ -14,18 +14,18 @@ def parent(name: str, value: Any) -> dict[str, str]:
 async def test_a_live_object_offers_values(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Chooser") as stage:
         alice, stranger, bob = await stage.person("alice"), await stage.person(), await stage.person("bob")
-        asked: dict[str, Any] = {"id": "x", "param_id": "shelf"}
-        assert "No scene is open" in await refused(stranger, "ActionParamValues", **asked)
+        request: dict[str, Any] = {"id": "x", "param_id": "shelf"}
+        assert "No scene is open" in await refused(stranger, "ActionParamValues", **request)
         await stage.place(alice, chooser="Chooser")
-        asked["id"] = chooser = stage.ids["chooser"]
-        assert "not logged in" in await refused(stranger, "ActionParamValues", **asked)
-        assert "offline" in await refused(alice, "ActionParamValues", **asked)
+        request["id"] = chooser = stage.ids["chooser"]
+        assert "not logged in" in await refused(stranger, "ActionParamValues", **request)
+        assert "offline" in await refused(alice, "ActionParamValues", **request)
         (meta,) = [m for m in await alice.ask("GetActions", type="Chooser") if m["name"] == "take"]
         dynamic = {p["name"]: set(p.get("dynamic_value_parents", ())) for p in meta["parameters"] if p["dynamic_value"]}
         assert dynamic == {"shelf": set(), "item": {"shelf", "count"}}
         await stage.start(alice)
 
-        assert sorted(await alice.ask("ActionParamValues", **asked)) == ["lower", "upper"]
+        assert sorted(await alice.ask("ActionParamValues", **request)) == ["lower", "upper"]
         both = [parent("shelf", "lower"), parent("count", 2)]
         items: dict[str, Any] = {"id": chooser, "param_id": "item"}
         for parents in (both, both[::-1], [parent("shelf", '"lower"'), both[1]]):
@@ -35,7 +35,7 @@ async def test_a_live_object_offers_values(tmp_path: Path) -> None:
             ]
         for parents in ([], both[:1], [*both, parent("an", "x")], [both[0], both[0]]):
             assert "count, shelf" in await refused(alice, "ActionParamValues", **items, parent_params=parents)
-        unneeded = await refused(alice, "ActionParamValues", **asked, parent_params=both[:1])
+        unneeded = await refused(alice, "ActionParamValues", **request, parent_params=both[:1])
         assert "no other parameter" in unneeded
         assert "no values" in await refused(alice, "ActionParamValues", id=chooser, param_id="count")
         assert "not of the type integer" in await refused(
@@ -44,8 +44,8 @@ async def test_a_live_object_offers_values(tmp_path: Path) -> None:
         wrong = [parent("shelf", "middle"), both[1]]
         assert "there is no shelf middle" in await refused(alice, "ActionParamValues", **items, parent_params=wrong)
         await bob.lock(chooser)
-        assert "lock" in await refused(alice, "ActionParamValues", **asked)
-        assert await bob.ask("ActionParamValues", **asked), "the holder of the write lock may ask"
+        assert "lock" in await refused(alice, "ActionParamValues", **request)
+        assert await bob.ask("ActionParamValues", **request), "the holder of the write lock gets no values"
 
 
 # ------------------------------------------------------------------------------------------------ overrides
@@ -105,19 +105,19 @@ async def test_overrides_apply_online_and_in_the_package(tmp_path: Path) -> None
 
         await stage.start(alice)
         await alice.ask("ExecuteAction", action_id=action)
-        assert (await happens(alice, "ActionResult"))["results"] == ['"moin 7"']
+        assert (await until_event(alice, "ActionResult"))["results"] == ['"moin 7"']
         await stage.stop(alice)
 
         await alice.ask("SaveProject")
         alice.take()
         await alice.ask("TemporaryPackage", start_paused=False)
-        assert (await happens(alice, "ActionStateAfter"))["results"] == ['"moin 7"'], "the package overrides it too"
+        assert (await until_event(alice, "ActionStateAfter"))["results"] == ['"moin 7"'], "the package overrides it too"
         await alice.ask("StopPackage")
-        await happens(alice, "OpenProject")
+        await until_event(alice, "OpenProject")
 
         await alice.lock(chooser)
         await change_override("DeleteOverride", "remove", override | {"value": '"moin"'})
         await alice.ask("WriteUnlock", object_id=chooser)
         await stage.start(alice)
         await alice.ask("ExecuteAction", action_id=action)
-        assert (await happens(alice, "ActionResult"))["results"] == ['"hello 7"']
+        assert (await until_event(alice, "ActionResult"))["results"] == ['"hello 7"']

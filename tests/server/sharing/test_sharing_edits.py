@@ -7,7 +7,7 @@ import pytest
 
 from arcor2_server.documents.edit_notifications import label
 from arcor2_server.execution import breakpoints
-from tests.server.session.edits import EDITS, make, rich_project
+from tests.server.session.edits import EDITS, apply_edit, rich_project
 from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 from tests.server.session.work import POSE, Work
 from tests.server.sharing.conftest import expect, subscribed
@@ -156,7 +156,7 @@ async def test_each_user_is_notified_of_possible_undo(alice: Person, bob: Person
     assert await expect(alice, "HistoryChanged") == {"revision": 0}
 
 
-SENTENCES = {
+UNDO_TEXTS = {
     "AddActionPoint": "adding the action point new",
     "RenameActionPoint": "renaming the action point base to other",
     "UpdateActionPointPosition": "moving the action point base",
@@ -186,17 +186,17 @@ SENTENCES = {
 }
 
 
-async def test_every_edit_has_a_name(server: SessionServer, alice: Person, work: Work) -> None:
+async def test_every_edit_has_a_text_for_undo(server: SessionServer, alice: Person, work: Work) -> None:
     ids = await rich_project(work)
     ids["project"] = server.session.require_project().id
     found = {}
     for name, edit in EDITS.items():
-        await make(alice, edit, ids)
+        await apply_edit(alice, edit, ids)
         undo = server.session.history.undoable("alice")
         assert undo is not None
         found[name] = str(label(undo, server.session.history))
         await alice.ask("Undo")
-    assert found == SENTENCES
+    assert found == UNDO_TEXTS
     await alice.ask("CloseProject", force=True)
     await alice.ask("OpenScene", id=(await alice.ask("ListScenes"))[0]["id"])
     await alice.lock(ids["robot"])

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.role import Role
-from tests.server.protocol.stage import Actor, Stage, happens, open_stage, until
+from tests.server.protocol.stage import Actor, Stage, open_stage, until, until_event
 from tests.server.protocol.test_protocol_temporary import project
 from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, Work
@@ -21,7 +21,7 @@ async def leave(person: Person) -> None:
     person.server._people.remove(person)
 
 
-def of(person: Person, role: Role) -> None:
+def set_role_of_bob(person: Person, role: Role) -> None:
     client = person.server.services.users.client_of("bob")
     assert client is not None
     client.ceiling = role
@@ -51,10 +51,10 @@ async def test_locks_of_a_user_who_left_are_listed_and_taken_over(
     assert max(lock["since"] for lock in holder["locks"]) < holder["left"]
     for person, role, reason in ((stranger, None, "RegisterUser"), (bob, Role.OPERATOR, "standard user")):
         if role is not None:
-            of(bob, role)
+            set_role_of_bob(bob, role)
         with pytest.raises(Refused, match=reason):
             await person.ask("TakeOverLocks", user="alice")
-    of(bob, Role.STANDARD_USER)
+    set_role_of_bob(bob, Role.STANDARD_USER)
     await bob.ask("TakeOverLocks", user="alice", dry_run=True)
     assert server.services.locks.owners() == ["alice"]
     bob.take()
@@ -109,7 +109,7 @@ async def test_users_of_an_open_project_are_listed(
 ) -> None:
     key = await Work(alice).project("p")
     await leave(alice)
-    of(bob, role)
+    set_role_of_bob(bob, role)
     if presence is not None:
         await bob.ask("UpdatePresence", **{name: value.replace("@", key) for name, value in presence.items()})
     assert server.services.presence.users_of([key]) == (["bob"] if used else [])
@@ -152,13 +152,13 @@ async def test_a_project_that_was_left_open_does_not_block_a_program(tmp_path: P
         await olga.ask("RunPackage", id=key)
         assert locks.owners() == []
         assert session.project is None
-        await happens(olga, "PackageState", state="running")
+        await until_event(olga, "PackageState", state="running")
         assert (
             await _refusal(olga, "OpenProject", id=opened.id if opened else "")
             == "A program is running. Stop it first."
         )
         await olga.ask("StopPackage")
-        again = await happens(olga, "OpenProject")
+        again = await until_event(olga, "OpenProject")
         assert [each["name"] for each in again["project"]["action_points"]] == ["ap", "unsaved"]
         assert (session.project, list(session.history), session.has_changes) == (opened, history, True)
         (run,) = (await olga.ask("ListRuns"))["runs"]
@@ -168,14 +168,14 @@ async def test_a_project_that_was_left_open_does_not_block_a_program(tmp_path: P
         assert names.index("ProjectClosed") < names.index("PackageInfo") < names.index("OpenProject")
         # Again, without any user; the owner then finds the project unchanged.
         await olga.ask("RunPackage", id=key)
-        await happens(olga, "PackageState", state="running")
+        await until_event(olga, "PackageState", state="running")
         await olga.ask("StopPackage")
-        await happens(olga, "OpenProject")
-        back = await stage.newcomer()
-        await back.ask("RegisterUser", user_name="alice")
-        notice = await happens(back, "Notification", level="Warn")
+        await until_event(olga, "OpenProject")
+        returned = await stage.newcomer()
+        await returned.ask("RegisterUser", user_name="alice")
+        notice = await until_event(returned, "Notification", level="Warn")
         assert notice["message"].startswith("olga released your locks")
-        await back.ask("Undo")
+        await returned.ask("Undo")
         assert [each.name for each in session.require_project().action_points] == ["ap"]
 
 
@@ -192,7 +192,7 @@ async def test_a_restart_during_a_temporary_run_reopens_the_project(tmp_path: Pa
         await alice.ask("AddActionPoint", name="unsaved", position=ORIGIN)
         await leave(alice)
         await olga.ask("RunPackage", id=key)
-        await happens(olga, "PackageState", state="running")
+        await until_event(olga, "PackageState", state="running")
         assert stage.services.session.project is None
     async with open_stage(tmp_path) as stage:
         points = stage.services.session.require_project().action_points
@@ -205,7 +205,7 @@ async def test_a_project_in_use_stays_open(tmp_path: Path) -> None:
         alice, olga = await stage.person("alice"), await operator_client(stage)
         key = await package(stage, alice)
         await olga.ask("RunPackage", id=key)  # the offline object is not an obstacle
-        await happens(olga, "PackageState", state="running")
+        await until_event(olga, "PackageState", state="running")
         assert stage.services.session.project is not None
         await olga.ask("StopPackage")
         await until(lambda: stage.services.execution.state.value == "stopped")

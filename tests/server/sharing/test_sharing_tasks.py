@@ -11,7 +11,7 @@ from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.websocket.hub import Hub
-from tests.server.protocol.stage import Actor, happens, open_stage, refused, until
+from tests.server.protocol.stage import Actor, open_stage, refused, until, until_event
 from tests.server.protocol.test_protocol_temporary import project
 from tests.server.session.session_server import Refused
 
@@ -20,27 +20,31 @@ def tasks(person: Actor) -> list[dict[str, Any]]:
     return [event["data"] for event in person.events() if event["event"] == "TaskState"]
 
 
-async def test_a_scene_is_started_and_stopped(tmp_path: Path) -> None:
+async def test_starting_and_stopping_a_scene_are_tasks(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm", "DumbArm") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         await stage.place(alice, arm="Arm", second="DumbArm")
         await bob.ask("SubscribeEvents", events=["TaskState"])
         bob.take()
         await alice.ask("StartScene")
-        begun = await happens(bob, "TaskState", kind="scene_start")
-        assert (begun["state"], begun["title"], begun["started_by"]) == ("running", "Starting the scene scene", "alice")
+        started = await until_event(bob, "TaskState", kind="scene_start")
+        assert (started["state"], started["title"], started["started_by"]) == (
+            "running",
+            "Starting the scene scene",
+            "alice",
+        )
         late = await stage.newcomer()
         await late.ask("SubscribeEvents", events=["TaskState"])
-        under_way = [event["data"]["id"] for event in late.events() if event["event"] == "TaskState"]
-        ended = await happens(bob, "TaskState", state="finished")
-        assert ended["id"] == begun["id"]
+        running_ids = [event["data"]["id"] for event in late.events() if event["event"] == "TaskState"]
+        ended = await until_event(bob, "TaskState", state="finished")
+        assert ended["id"] == started["id"]
         assert ended["progress"] == 1
-        assert under_way == [begun["id"]]  # two imports and two connections take longer than this
+        assert running_ids == [started["id"]]  # two imports and two connections take longer than this
         progress = [task["progress"] for task in tasks(bob) if "progress" in task]
         assert progress == sorted(progress)
-        await happens(alice, "SceneState", state="started")
+        await until_event(alice, "SceneState", state="started")
         await bob.ask("StopScene")
-        ended = await happens(bob, "TaskState", state="finished", kind="scene_stop")
+        ended = await until_event(bob, "TaskState", state="finished", kind="scene_stop")
         assert ended["started_by"] == "bob"
         assert "TaskState" not in alice.names()
         assert stage.services.tasks.running_events() == []
@@ -54,12 +58,12 @@ async def test_the_tasks_of_a_run_name_the_user_who_requested_it(tmp_path: Path)
         await bob.ask("SubscribeEvents", events=["TaskState"])
         bob.take()
         await bob.ask("TemporaryPackage", start_paused=True)
-        assert (await happens(bob, "TaskState", kind="scene_stop"))["started_by"] == "bob"
-        await happens(bob, "PackageState", state="paused")
+        assert (await until_event(bob, "TaskState", kind="scene_stop"))["started_by"] == "bob"
+        await until_event(bob, "PackageState", state="paused")
         await refused(alice, "StartScene")
         await bob.ask("StopPackage")
-        assert (await happens(bob, "TaskState", kind="scene_start"))["started_by"] == "bob"
-        await happens(bob, "SceneState", state="started")
+        assert (await until_event(bob, "TaskState", kind="scene_start"))["started_by"] == "bob"
+        await until_event(bob, "SceneState", state="started")
         await stage.stop(alice)
 
 
@@ -74,10 +78,10 @@ async def test_a_failed_scene_start_is_a_failed_task(tmp_path: Path) -> None:
 
         stage.services.online._go_online = broken  # type: ignore[method-assign, assignment]
         await alice.ask("StartScene")
-        failed = await happens(alice, "TaskState", kind="scene_start", state="failed")
+        failed = await until_event(alice, "TaskState", kind="scene_start", state="failed")
         assert failed["message"] == "The camera is not there."
-        await happens(alice, "TaskState", kind="scene_stop", state="finished")
-        await happens(alice, "SceneState", state="stopped")
+        await until_event(alice, "TaskState", kind="scene_stop", state="finished")
+        await until_event(alice, "SceneState", state="stopped")
 
 
 async def test_a_build_is_a_task_that_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -149,6 +153,6 @@ async def test_a_disabled_object_is_not_an_obstacle(tmp_path: Path) -> None:
         await until(lambda: set(services.scene_collisions.online_obstacles()) == {part})
         await services.online.call(part, "set_enabled", {"state": False})
         await stage.stop(alice)
-        await stage.start(alice)  # a new instance counts
+        await stage.start(alice)  # a new instance is enabled
         assert set(services.scene_collisions.online_obstacles()) == {part}
         await stage.stop(alice)

@@ -100,8 +100,8 @@ async def test_only_the_newest_documents_are_kept(monkeypatch: pytest.MonkeyPatc
         await alice.ask("SetViewState", scope="user", document=f"pro_{number}", values={"a": number})
     await alice.ask("SetViewState", scope="user", document="pro_0", values={"b": 1})
     await alice.ask("SetViewState", scope="user", document="pro_3", values={"a": 3})
-    kept = [(await view(alice, document=f"pro_{number}"))["values"] for number in range(4)]
-    assert kept == [{"a": 0, "b": 1}, {}, {"a": 2}, {"a": 3}]
+    stored = [(await view(alice, document=f"pro_{number}"))["values"] for number in range(4)]
+    assert stored == [{"a": 0, "b": 1}, {}, {"a": 2}, {"a": 3}]
 
 
 async def test_view_states_survive_a_restart_and_end_with_their_document(tmp_path: Path) -> None:
