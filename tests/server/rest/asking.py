@@ -13,11 +13,11 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_server.app import Server, create_app
 
 TRANSLATION = {"key", "values"}
-"""Fields of an error that contains values; they are not part of the protocol, and clients ignore them."""
+"""Fields for the translation of an error. The protocol does not contain them, and clients ignore them."""
 
 
 @contextlib.asynccontextmanager
-async def asking(services: Server) -> AsyncIterator[httpx.AsyncClient]:
+async def rest_client(services: Server) -> AsyncIterator[httpx.AsyncClient]:
     """Return a client that sends requests to the server's parts over REST, without a network."""
     transport = httpx.ASGITransport(create_app(services))  # type: ignore[arg-type]
     async with httpx.AsyncClient(timeout=60, transport=transport, base_url="http://127.0.0.1:6789") as client:

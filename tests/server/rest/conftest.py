@@ -14,7 +14,7 @@ from arcor2_server.app import Server, running_server
 from arcor2_server.settings import ServerSettings
 from tests import forked_children
 from tests.server.core.serving import ServerProcess, until
-from tests.server.rest.asking import asking, start_workers
+from tests.server.rest.asking import rest_client, start_workers
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -34,7 +34,7 @@ async def services(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Se
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def http(services: Server) -> AsyncIterator[httpx.AsyncClient]:
     """Return a REST client of the server's parts."""
-    async with asking(services) as client:
+    async with rest_client(services) as client:
         yield client
 
 

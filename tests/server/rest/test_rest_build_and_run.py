@@ -38,9 +38,9 @@ from arcor2_hw.objects import CollisionObject
 class Crate(CollisionObject):
     _ABSTRACT = False
 """
-STANDING = {"name": "crate", "type": "Crate", "id": "obj_k", "pose": {"position": {"x": 2, "y": 0, "z": 0}}}
+CRATE_OBJECT = {"name": "crate", "type": "Crate", "id": "obj_k", "pose": {"position": {"x": 2, "y": 0, "z": 0}}}
 OBJECT = {"name": "counter", "type": "Counter", "id": "obj_c"}
-SCENE = {"id": "scn_c", "name": "count scene", "objects": [OBJECT, STANDING]}
+SCENE = {"id": "scn_c", "name": "count scene", "objects": [OBJECT, CRATE_OBJECT]}
 PROJECT = {
     "id": "pro_c",
     "name": "count ß",
@@ -324,16 +324,16 @@ async def test_an_upload_of_a_hundred_megabytes_does_not_block_others(server: Se
         await follower.subscribe_events({"TaskState"})
         upload = asyncio.create_task(asyncio.to_thread(httpx.post, url, files=as_file(content), timeout=60))
         process = psutil.Process(server.process.pid)
-        slowest, before, most = 0.0, process.memory_info().rss, 0
+        slowest, before, peak = 0.0, process.memory_info().rss, 0
         while not upload.done():
             started = time.monotonic()
             granted(await http.get("/packages/state"))
             slowest = max(slowest, time.monotonic() - started)
-            most = max(most, process.memory_info().rss)
+            peak = max(peak, process.memory_info().rss)
             await asyncio.sleep(0.02)
         granted(upload.result())
         assert slowest < 20.0
-        assert most - before < 40_000_000, "received data are written to the disk at once"
+        assert peak - before < 40_000_000, "received data are written to the disk at once"
         states = await _upload_states(follower)
         assert {one.title for one in states} == {"Uploading the package pkg_big"}
         shares = [one.progress for one in states if not isinstance(one.progress, Unset)]
@@ -427,7 +427,7 @@ async def test_calibration_of_a_robot_needs_its_model(server: ServerProcess) -> 
         refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": "{}"}), 400, "Argument", "robotJoints")
 
 
-async def test_marker_tables_survive_a_restart(tmp_path: Any) -> None:
+async def test_tokens_breakpoints_and_assets_survive_a_restart(tmp_path: Any) -> None:
     async with running(tmp_path / "data") as first, httpx.AsyncClient(timeout=60, base_url=base(first)) as http:
         await prepare(http)
         token = granted(await http.post("/tokens/create", params={"name": "x"}))

@@ -80,8 +80,8 @@ async def test_the_original_route_returns_the_pose_and_its_inverse(
     assert pose.position.distance_to(Pose.from_matrix(CAMERA).position) < 0.003
     assert 0.0 < found["quality"] <= 1.0
     inverse = granted(await http.put("/calibrate/camera", params=QUERY | {"inverse": True}, files=parts(pictures[:1])))
-    there = pose * msgspec.convert(inverse["pose"], Pose)
-    assert there.position.distance_to(Position()) < 1e-9
+    identity = pose * msgspec.convert(inverse["pose"], Pose)
+    assert identity.position.distance_to(Position()) < 1e-9
     seen = granted(await http.put("/markers/corners", params=QUERY, files=parts(pictures[:1])))
     assert sorted(marker["marker_id"] for marker in seen) == [3, 17]
     assert all(len(marker["corners"]) == 4 for marker in seen)
@@ -98,11 +98,15 @@ async def test_complete_results_include_their_quality(http: httpx.AsyncClient, p
     answer = await http.put("/api/calibration/camera/picture", files=parts(pictures[:1], drawn))
     assert answer.headers["content-type"] == "image/png"
     assert cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR).shape[1] > 640
-    (kept,) = granted(await http.get("/api/calibrations", params={"object_id": "obj_cam"}))
-    assert (kept["kind"], kept["verdict"], kept["residual_unit"]) == ("camera_pose", found["verdict"], "px")
-    assert kept["after"] == found["pose"]
-    assert len(kept["inputs"]) == 2
-    assert kept["applied"] is False
+    (stored_record,) = granted(await http.get("/api/calibrations", params={"object_id": "obj_cam"}))
+    assert (stored_record["kind"], stored_record["verdict"], stored_record["residual_unit"]) == (
+        "camera_pose",
+        found["verdict"],
+        "px",
+    )
+    assert stored_record["after"] == found["pose"]
+    assert len(stored_record["inputs"]) == 2
+    assert stored_record["applied"] is False
 
     lens = {"camera_parameters": PARAMETERS, "markers": MARKERS}
     checked = granted(await http.put("/api/calibration/lens", files=parts(pictures, lens)))
@@ -156,9 +160,9 @@ async def test_touched_points_are_stored_with_their_result(http: httpx.AsyncClie
     found = granted(await http.put("/api/calibration/touch/frame-by-points", json=body))
     assert msgspec.convert(found["pose"], Pose).position.distance_to(Position(0.5, 0.1, 0.0)) < 1e-9
     assert found["checked"] is True
-    (kept,) = granted(await http.get("/api/calibrations", params={"object_id": "obj_arm"}))
-    assert (kept["kind"], kept["object_name"]) == ("base_frame", "obj_arm")
-    assert len(kept["parameters"]["args"]["touched"]) == 4
+    (stored_record,) = granted(await http.get("/api/calibrations", params={"object_id": "obj_arm"}))
+    assert (stored_record["kind"], stored_record["object_name"]) == ("base_frame", "obj_arm")
+    assert len(stored_record["parameters"]["args"]["touched"]) == 4
     line = msgspec.to_builtins({"known": known[:1] * 3, "touched": known[:1] * 3})
     refused(await http.put("/api/calibration/touch/frame-by-points", json=line), 409, "Invalid")
     axes = msgspec.to_builtins({"origin": Position(), "on_x": Position(1), "in_plane": [Position(0, 1)]})
@@ -267,7 +271,7 @@ async def test_markers_of_a_file_take_precedence(tmp_path: Path) -> None:
     with pytest.raises(Conflict, match="marker file"):
         await markers.set(CalibrationConfiguration())
     assert markers.configuration == given
-    away = Markers(tmp_path / "none" / "markers.json")
+    unwritable = Markers(tmp_path / "none" / "markers.json")
     with pytest.raises(StorageError, match=r"markers\.json"):
-        await away.set(given)
-    assert away.configuration.markers == []
+        await unwritable.set(given)
+    assert unwritable.configuration.markers == []

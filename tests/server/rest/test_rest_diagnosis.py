@@ -40,7 +40,7 @@ def test_secrets_are_recognised_by_name(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["password_file", "host", "spinning", "keyboard", "compass"])
-def test_other_values_are_kept(name: str) -> None:
+def test_other_values_are_not_hidden(name: str) -> None:
     value = {name: "x", "list": [{"name": name, "value": 1}], "none": None}
     assert hide(value) == value
     assert list(secrets_in(value)) == []
@@ -151,8 +151,8 @@ async def test_the_bundle_contains_open_documents_and_no_secrets(
         assert "wrong token" in events
 
         # A client's own notes are included and redacted as well; too many are refused.
-        noted = {"client": {"errors": [f"refused {PASSWORD}", f"at /?token={key}"], "token": key}}
-        answer = await http.post("/api/diagnosis", json=noted, headers=by(key))
+        client_notes = {"client": {"errors": [f"refused {PASSWORD}", f"at /?token={key}"], "token": key}}
+        answer = await http.post("/api/diagnosis", json=client_notes, headers=by(key))
         notes = content(answer.content)["client.json"]
         assert json.loads(notes) == {"errors": [f"refused {HIDDEN}", f"at /?token={HIDDEN}"], "token": HIDDEN}
         much = {"client": {"errors": ["x" * 300_000]}}
@@ -165,6 +165,6 @@ async def test_the_bundle_contains_open_documents_and_no_secrets(
         assert json.loads(content(target.read_bytes())["scene.json"]) == scene
         assert await asyncio.to_thread(app, arguments) == ExitStatus.CONFLICT
         assert "--force" in capsys.readouterr().err
-        lesser = [*arguments[:1], str(tmp_path / "no.zip"), "--url", server.url, "--token", operator]
-        assert await asyncio.to_thread(app, lesser) == ExitStatus.NOT_PERMITTED
+        forbidden = [*arguments[:1], str(tmp_path / "no.zip"), "--url", server.url, "--token", operator]
+        assert await asyncio.to_thread(app, forbidden) == ExitStatus.NOT_PERMITTED
         assert not (tmp_path / "no.zip").exists()

@@ -17,7 +17,7 @@ from arcor2_server.app import Server, running_server
 from arcor2_server.execution.runs import RunStart
 from arcor2_server.settings import ServerSettings
 from tests.runtime.conftest import scene_object
-from tests.server.rest.asking import asking, granted
+from tests.server.rest.asking import granted, rest_client
 
 
 def report(server: Server, value: float | str) -> None:
@@ -30,7 +30,7 @@ def report(server: Server, value: float | str) -> None:
 async def test_points_and_runs_are_read_before_and_after_they_are_moved(tmp_path: Path) -> None:
     clock = [1_760_000_000.0]
     settings = ServerSettings(data_dir=tmp_path, point_history=True, point_history_interval=0.1)
-    async with running_server(settings) as server, asking(server) as http:
+    async with running_server(settings) as server, rest_client(server) as http:
         server.history._clock = lambda: clock[0]
         board = server.scene_host.board
         board.show([scene_object("oven", "Oven")], {})

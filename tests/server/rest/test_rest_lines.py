@@ -47,12 +47,12 @@ SHARES = [n / SAMPLES for n in range(SAMPLES + 1)]
 def test_a_line_hits_shapes_that_contain_its_points(
     start: Position, end: Position, placed: Obstacle, inflation: float
 ) -> None:
-    way = end - start
-    samples = [start + Position(way.x * share, way.y * share, way.z * share) for share in SHARES]
+    direction = end - start
+    samples = [start + Position(direction.x * share, direction.y * share, direction.z * share) for share in SHARES]
     hit = first_hit(start, end, [("it", placed)], inflation) is not None
     # Between two samples a line can graze a body unnoticed. Only then may the results differ, and only slightly.
     if hit:
-        near = inflation + math.hypot(*way) / SAMPLES * 2 + 1e-9
+        near = inflation + math.hypot(*direction) / SAMPLES * 2 + 1e-9
         assert any(inside(point, placed, 2 * near) for point in samples)
     else:
         assert not any(inside(point, placed, inflation - 1e-9) for point in samples)
@@ -68,7 +68,7 @@ def test_shapes_grow_by_the_given_margin() -> None:
     assert first_hit(Position(0, 0, 0.504), Position(0.1, 0, 0.504), top, 0.01) == Hit("x", 0.0)
 
 
-def test_lines_without_length_and_lines_from_inside() -> None:
+def test_a_line_of_length_zero_or_from_inside_hits_the_shape() -> None:
     ball = [("x", Obstacle.of(Sphere("x", 1), Pose()))]
     assert first_hit(Position(), Position(), ball, 0.0) == Hit("x", 0.0)
     assert first_hit(Position(2), Position(2), ball, 0.0) is None

@@ -8,20 +8,20 @@ from tests.server.rest.test_rest_build_and_run import base
 from tests.server.rest.test_rest_storage import lamp, scene
 
 
-async def test_types_are_announced_before_the_scene_opens(server: ServerProcess) -> None:
+async def test_clients_are_notified_of_types_before_the_scene_opens(server: ServerProcess) -> None:
     async with httpx.AsyncClient(timeout=60, base_url=base(server)) as http, talking(server.url, "ann") as ann:
         for name in ("LampA", "LampB"):
             granted(await http.put("/object-types", json=lamp(name)))
         await ann.granted("NewScene", {"name": "scene"})
-        announced: list[str] = []
-        # On a busy computer the uploads may be announced in two events.
+        received: list[str] = []
+        # On a busy computer the uploads may be published in two events.
         while "OpenScene" not in [event["event"] for event in ann.events]:
             ann.events.append(await ann.receive())
         while ann.events[0]["event"] == "ChangedObjectTypes":
             event = ann.events.pop(0)
             assert event["change_type"] == "add"
-            announced += [meta["type"] for meta in event["data"]]
-        assert sorted(announced) == ["LampA", "LampB"]
+            received += [meta["type"] for meta in event["data"]]
+        assert sorted(received) == ["LampA", "LampB"]
         await ann.event("OpenScene")
         await ann.event("SceneState")
         await ann.nothing_more()

@@ -19,7 +19,7 @@ from tests.server.core.serving import RawConnection, ServerProcess, running, tal
 from tests.server.rest.asking import granted
 from tests.server.rest.test_rest_build_and_run import as_file, base, prepare, published
 
-ANY = {
+FREE_PORTS = {
     "ARCOR2_STORAGE_SERVICE_PORT": "0",
     "ARCOR2_SCENE_SERVICE_PORT": "0",
     "ARCOR2_EXECUTION_PROXY_PORT": "0",
@@ -75,7 +75,7 @@ def ports_of(server: ServerProcess) -> dict[str, int]:
 
 
 async def test_each_service_listens_at_its_port(tmp_path: Path) -> None:
-    async with running(tmp_path / "data", "--classic-ports", **ANY) as server:
+    async with running(tmp_path / "data", "--classic-ports", **FREE_PORTS) as server:
         ports = ports_of(server)
         assert set(ports) == {"Storage", "Scene", "Execution", "Build", SOCKET, "Calibration"}
         routes = {
@@ -97,7 +97,7 @@ async def test_each_service_listens_at_its_port(tmp_path: Path) -> None:
             assert {"/scenes", "/collisions", "/project/publish", "/packages", "/markers/corners"} <= set(
                 everything["paths"]
             )
-        # A websocket there is ARServer's, except at the Execution service's port.
+        # A websocket at these ports behaves like ARServer's, except at the Execution service's port.
         async with talking(f"ws://127.0.0.1:{ports['Storage']}") as talker:
             await talker.granted("SystemInfo")
         async with connect(f"ws://127.0.0.1:{ports[SOCKET]}") as socket:
@@ -106,18 +106,20 @@ async def test_each_service_listens_at_its_port(tmp_path: Path) -> None:
             assert await executing.granted("Version") == {"version": "1.2.0"}
 
 
-async def test_a_used_port_is_named(tmp_path: Path) -> None:
+async def test_the_error_names_a_used_port(tmp_path: Path) -> None:
     blocker = await asyncio.start_server(lambda _reader, writer: writer.close(), "127.0.0.1", 0)
     port = blocker.sockets[0].getsockname()[1]
     async with blocker:
-        server = ServerProcess(tmp_path / "data", "--classic-ports", **ANY | {"ARCOR2_STORAGE_SERVICE_PORT": str(port)})
+        server = ServerProcess(
+            tmp_path / "data", "--classic-ports", **FREE_PORTS | {"ARCOR2_STORAGE_SERVICE_PORT": str(port)}
+        )
         with pytest.raises(AssertionError, match=f"{port}.* is used by another program"):
             await server.start()
         await server.stop()
 
 
 # ------------------------------------------------------------------------------------------------ the websocket
-async def entered(socket: ClientConnection) -> RawConnection:
+async def connected(socket: ClientConnection) -> RawConnection:
     talker = RawConnection(socket)
     state = await talker.event("PackageState")
     assert state["data"] == {"state": "undefined"}
@@ -142,7 +144,7 @@ async def test_the_execution_port_serves_only_packages(tmp_path: Path) -> None:
         connect(f"{server.url}/execution") as socket,
         talking(server.url, "ann") as editor,
     ):
-        execution = await entered(socket)
+        execution = await connected(socket)
         assert await execution.granted("Version") == {"version": "1.2.0"}
         for name in ("SystemInfo", "RegisterUser", "ListScenes", "NewScene", "NoSuchThing"):
             assert name in await execution.refused(name)
@@ -196,4 +198,4 @@ async def test_the_execution_websocket_requires_a_token(tmp_path: Path) -> None:
             refusal = await talker.refused("UploadPackage", {"id": "pkg_a", "data": ""})
             assert "programmer" in refusal
         async with connect(f"{server.url}/execution?token={secret}") as socket:
-            await entered(socket)
+            await connected(socket)

@@ -57,8 +57,8 @@ async def put(http: httpx.AsyncClient, key: str, content: bytes, name: str = "",
     granted(await http.post("/assets", params={"id": key, **query}, files=files))
 
 
-def no_digest(content: bytes, mark: bytes) -> bytes:
-    """Return the same mesh as other bytes: the header of a binary STL has no meaning."""
+def with_header(content: bytes, mark: bytes) -> bytes:
+    """Return the same mesh with another header, which has no meaning in a binary STL but changes the digest."""
     return mark.ljust(80) + content[80:]
 
 
@@ -86,7 +86,7 @@ async def test_simultaneous_requests_share_one_conversion(
 
 
 async def test_assets_are_cached_and_compressed_by_http_headers(http: httpx.AsyncClient) -> None:
-    await put(http, "tagged.stl", no_digest(BALL, b"tagged"))
+    await put(http, "tagged.stl", with_header(BALL, b"tagged"))
     plain = await http.get(SHOWN.format("tagged.stl"), headers={"Accept-Encoding": "identity"})
     packed = await http.get(SHOWN.format("tagged.stl"))
     assert packed.headers["content-encoding"] == "gzip"
@@ -98,16 +98,16 @@ async def test_assets_are_cached_and_compressed_by_http_headers(http: httpx.Asyn
     again = await http.get(SHOWN.format("tagged.stl"), headers=known)
     assert (again.status_code, again.content) == (304, b"")
     # Another mesh under the same id results in another answer.
-    await put(http, "tagged.stl", no_digest(BALL, b"newer"), upsert=True)
+    await put(http, "tagged.stl", with_header(BALL, b"newer"), upsert=True)
     assert (await http.get(SHOWN.format("tagged.stl"), headers=known)).status_code == 200
 
 
-async def test_a_broken_mesh_is_refused_by_name_after_one_attempt(http: httpx.AsyncClient, runs: list[str]) -> None:
+async def test_a_broken_mesh_is_refused_after_one_attempt(http: httpx.AsyncClient, runs: list[str]) -> None:
     await put(http, "asset_1", b"solid nothing", "bracket.stl")
     for _ in range(2):
         refused(await http.get(SHOWN.format("asset_1")), 400, "Argument", "bracket.stl")
     assert runs == ["bracket.stl"]
-    await put(http, "asset_1", no_digest(BALL, b"mended"), "bracket.stl", upsert=True)
+    await put(http, "asset_1", with_header(BALL, b"mended"), "bracket.stl", upsert=True)
     assert (await http.get(SHOWN.format("asset_1"))).status_code == 200
     refused(await http.get(SHOWN.format("asset_2")), 404, "NotFound", "asset_2")
 
@@ -115,29 +115,29 @@ async def test_a_broken_mesh_is_refused_by_name_after_one_attempt(http: httpx.As
 async def test_a_long_conversion_is_announced_as_a_task(
     http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    began: list[str] = []
+    titles: list[str] = []
     begin = services.tasks.begin
 
-    def noted(kind: TaskKind, title: Message) -> Task:
-        began.append(title.text)
+    def recorded_begin(kind: TaskKind, title: Message) -> Task:
+        titles.append(title.text)
         return begin(kind, title)
 
-    monkeypatch.setattr(services.tasks, "begin", noted)
-    await put(http, "quick.stl", no_digest(BALL, b"quick"), "quick one.stl")
+    monkeypatch.setattr(services.tasks, "begin", recorded_begin)
+    await put(http, "quick.stl", with_header(BALL, b"quick"), "quick one.stl")
     monkeypatch.setattr(prepared_module, "SHOWN_AFTER", 60.0)
     await http.get(SHOWN.format("quick.stl"))
-    assert began == []
+    assert titles == []
     monkeypatch.setattr(prepared_module, "SHOWN_AFTER", 0.0)
-    await put(http, "slow.stl", no_digest(BALL, b"slow"), "slow one.stl")
+    await put(http, "slow.stl", with_header(BALL, b"slow"), "slow one.stl")
     await http.get(SHOWN.format("slow.stl"))
-    assert began == ["Preparing slow one.stl for the editor"]
+    assert titles == ["Preparing slow one.stl for the editor"]
     assert services.tasks.running_events() == []
 
 
 async def test_a_crashed_worker_fails_one_request_without_blaming_the_mesh(
     http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    await put(http, "unlucky.stl", no_digest(BALL, b"unlucky"))
+    await put(http, "unlucky.stl", with_header(BALL, b"unlucky"))
     with monkeypatch.context() as patched:
 
         async def stopped(*_: Any, **__: Any) -> None:
@@ -151,7 +151,7 @@ async def test_a_crashed_worker_fails_one_request_without_blaming_the_mesh(
 async def test_a_cancelled_request_does_not_affect_others(
     http: httpx.AsyncClient, services: Server, runs: list[str]
 ) -> None:
-    await put(http, "shared.stl", no_digest(BALL, b"shared"))
+    await put(http, "shared.stl", with_header(BALL, b"shared"))
     leaver = asyncio.create_task(services.display_models.get("shared.stl"))
     stayer = asyncio.create_task(services.display_models.get("shared.stl"))
     while not runs:
@@ -165,17 +165,17 @@ async def test_outdated_and_unused_assets_are_removed(
     http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder: Path = services.settings.prepared_dir
-    await put(http, "first.stl", no_digest(BALL, b"first"))
+    await put(http, "first.stl", with_header(BALL, b"first"))
     first = await services.display_models.get("first.stl")
     old = folder / f"{'0' * 64}.{CONVERSION - 1}.stl.glb"
     old.write_bytes(b"glTF")
     os.utime(first.plain, (1, 1))
-    kept = {file for file in folder.glob("*.glb") if file not in (first.plain, old)}
-    room = sum(file.stat().st_size for file in (*kept, first.plain))
-    monkeypatch.setattr(prepared_module, "MAX_SIZE", room + 1000)
-    await put(http, "second.stl", no_digest(BALL, b"second"))
+    remaining = {file for file in folder.glob("*.glb") if file not in (first.plain, old)}
+    size = sum(file.stat().st_size for file in (*remaining, first.plain))
+    monkeypatch.setattr(prepared_module, "MAX_SIZE", size + 1000)
+    await put(http, "second.stl", with_header(BALL, b"second"))
     second = await services.display_models.get("second.stl")
-    assert set(folder.glob("*.glb")) == kept | {second.plain}
+    assert set(folder.glob("*.glb")) == remaining | {second.plain}
     assert first.packed is not None
     assert not first.packed.exists()
     # It is converted again on request.

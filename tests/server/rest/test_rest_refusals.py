@@ -54,7 +54,7 @@ def test_the_answer_contains_its_translation_data() -> None:
     assert "key" not in msgspec.json.decode(refusal("Calibration", Arcor2Error("No marker.")).content)
 
 
-def test_key_and_values_cross_the_process_border() -> None:
+def test_translation_data_is_kept_across_processes() -> None:
     error = KinematicsError("{x:.1f} m is too far.", x=3)
     assert error_of(failed(error)).message == error.message
 

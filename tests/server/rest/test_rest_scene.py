@@ -13,7 +13,7 @@ from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_server.app import running_server
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import until
-from tests.server.rest.asking import asking, granted, refused
+from tests.server.rest.asking import granted, refused, rest_client
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -53,7 +53,7 @@ async def test_collision_models_are_added_and_removed(http: httpx.AsyncClient) -
     granted(await http.delete("/collisions/crate"))
     refused(await http.delete("/collisions/crate"), 404, "NotFound", "crate")
     assert granted(await http.put("/utils/line-safe", json=through_all))["object_id"] == "ball"
-    # Added again at another place, it is only there.
+    # An obstacle that is added again is moved.
     granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(5, 3)))
     assert granted(await http.put("/utils/line-safe", json=through_all))["object_id"] == "tube"
 
@@ -79,7 +79,7 @@ async def test_meshes_are_obstacles_with_their_exact_shape(http: httpx.AsyncClie
     assert granted(await http.put("/utils/line-safe", json=through))["object_id"] == "ball"
     granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(8)))
     assert granted(await http.put("/utils/line-safe", json=through))["object_id"] == "table"
-    # Added again, larger: it now reaches the other line.
+    # A mesh that is added again with a larger scale reaches the other line.
     granted(await http.put("/collisions/mesh", params=mesh | {"meshScaleZ": 2}, json=at(5)))
     assert granted(await http.put("/utils/line-safe", json=above)) == {"safe": False, "object_id": "table"}
 
@@ -88,7 +88,7 @@ async def test_meshes_are_obstacles_with_their_exact_shape(http: httpx.AsyncClie
     granted(await http.post("/assets", params={"id": "bad.stl"}, files={"assetData": ("bad.stl", b"no mesh at all")}))
     answer = await http.put("/collisions/mesh", params=mesh | {"meshFileId": "bad.stl"}, json=at(5))
     refused(answer, 400, "Argument", "bad.stl")
-    # A model that is removed during a request is named.
+    # The refusal names a model whose asset was deleted.
     granted(await http.delete("/assets/table.stl"))
     granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(8)))
     refused(await http.put("/utils/line-safe", json=through), 400, "Argument", "table.stl")
@@ -129,7 +129,7 @@ class Crate(CollisionObject):
 
 
 async def test_objects_of_the_online_scene_are_obstacles(http: httpx.AsyncClient, tmp_path: Path) -> None:
-    async with running_server(ServerSettings(data_dir=tmp_path)) as services, asking(services) as own:
+    async with running_server(ServerSettings(data_dir=tmp_path)) as services, rest_client(services) as own:
         await services.types.add(ObjectTypeSource("Crate", CRATE, model=ObjectModel.of(Box("Crate", 1, 1, 1))))
         placed = SceneObject("crate", "Crate", Pose(Position(3.0)), id="obj_crate")
         await services.session.show(Scene("scene", objects=[placed], id="scn_1"))

@@ -70,13 +70,13 @@ class Loop:
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         """Act as an ASGI application for any event loop."""
-        theirs = asyncio.get_running_loop()
+        caller_loop = asyncio.get_running_loop()
 
         async def take() -> Any:
-            return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(receive(), theirs))
+            return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(receive(), caller_loop))
 
         async def send_on(message: Any) -> None:
-            await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(send(message), theirs))
+            await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(send(message), caller_loop))
 
         work = asyncio.run_coroutine_threadsafe(self.app(scope, take, send_on), self._loop)
         await asyncio.wrap_future(work)

@@ -104,7 +104,7 @@ async def test_invalid_scenes_are_refused(http: httpx.AsyncClient, body: bytes) 
     refused(await http.get("/scenes/scn_x"), 404, "NotFound")
 
 
-async def test_a_text_that_is_too_long_is_named(http: httpx.AsyncClient) -> None:
+async def test_the_refusal_names_a_text_that_is_too_long(http: httpx.AsyncClient) -> None:
     body = scene("long") | {"name": "x" * 201}
     refused(await http.put("/scenes", json=body), 400, "Argument", "name has 201 characters", "at most 200")
 
@@ -130,11 +130,11 @@ async def test_error_exits_survive_a_client_that_does_not_know_them(http: httpx.
     known = {"id": "lit_1", "start": "act_1", "end": "END"}
     point = {"id": "acp_1", "name": "point", "position": POSE["position"]}
     sent = project("pro_e", "scn_e") | {"actionPoints": [point | {"actions": [action]}], "logic": [known]}
-    ours = sent | {
+    extended = sent | {
         "actionPoints": [point | {"actions": [action | {"errorOutput": "problem"}]}],
         "logic": [known, known | {"id": "lit_2", "errorKinds": ["refused"]}],
     }
-    granted(await http.put("/projects", json=ours))
+    granted(await http.put("/projects", json=extended))
     stored = granted(await http.get("/projects/pro_e"))
     assert [item.get("errorKinds") for item in stored["logic"]] == [None, ["refused"]]
     without = sent | {"logic": [known, known | {"id": "lit_2"}], "description": "theirs"}
@@ -156,8 +156,8 @@ async def test_interlocks_survive_a_client_that_does_not_know_them(http: httpx.A
     interlock = {"id": "ilk_1", "name": "Door", "on": "action", "objectId": other["id"], "needs": [need]}
     granted(await http.put("/scenes", json=sent | {"interlocks": [interlock]}))
     granted(await http.put("/scenes", json=sent | {"description": "theirs"}))
-    [kept] = granted(await http.get("/scenes/scn_i"))["interlocks"]
-    assert (kept["name"], kept["needs"][0]["observation"]) == ("Door", "door_open")
+    [stored] = granted(await http.get("/scenes/scn_i"))["interlocks"]
+    assert (stored["name"], stored["needs"][0]["observation"]) == ("Door", "door_open")
     refused(await http.put("/scenes", json=sent | {"objects": [other]}), 400, "Argument")
     wrong = interlock | {"needs": [need | {"observation": "window_open"}]}
     refused(await http.put("/scenes", json=sent | {"interlocks": [wrong]}), 400, "Argument")
@@ -274,7 +274,7 @@ async def test_a_model_is_stored_and_deleted(http: httpx.AsyncClient, kind: str,
     refused(await http.get(f"/models/a_{kind}/{other}"), 404, "NotFound")
 
 
-async def test_a_model_has_a_size(http: httpx.AsyncClient) -> None:
+async def test_a_model_without_a_size_is_refused(http: httpx.AsyncClient) -> None:
     refused(await http.put("/models/sphere", json={"id": "ball", "radius": 0}), 400, "Argument", "radius")
     refused(await http.put("/models/box", json={"id": "crate", "sizeX": 1.0, "sizeY": 1.0}), 400, "Argument", "sizeZ")
 
@@ -346,10 +346,10 @@ async def test_a_series_of_uploads_is_announced_once(
 ) -> None:
     announced: list[tuple[str, list[str]]] = []
 
-    def note(event: Any) -> None:
+    def record(event: Any) -> None:
         announced.append((str(event.change_type), [meta.type for meta in event.data]))
 
-    async def end_of(*bodies: dict[str, Any]) -> None:
+    async def upload_series(*bodies: dict[str, Any]) -> None:
         """Send all requests, none of which may be announced at once, and wait until they are announced."""
         before = len(announced)
         monkeypatch.setattr(notifications, "QUIET_PERIOD", 600)
@@ -362,9 +362,9 @@ async def test_a_series_of_uploads_is_announced_once(
 
     await services.type_notifications.close()
     await services.types.refresh()
-    monkeypatch.setattr(services.hub, "broadcast", note)
+    monkeypatch.setattr(services.hub, "broadcast", record)
     # A type that is uploaded twice is announced once.
-    await end_of(lamp("LampA"), lamp("LampB"), lamp("LampC"), lamp("LampB"))
+    await upload_series(lamp("LampA"), lamp("LampB"), lamp("LampC"), lamp("LampB"))
     assert announced == [("add", ["LampA", "LampB", "LampC"])]
 
     monkeypatch.setattr(notifications, "QUIET_PERIOD", 600)
@@ -372,7 +372,7 @@ async def test_a_series_of_uploads_is_announced_once(
     granted(await http.put("/object-types", json=lamp("LampD")))
     granted(await http.delete("/object-types/LampD"))
     granted(await http.put("/models/sphere", json={"id": "LampA", "radius": 1}))
-    await end_of(lamp("LampA", model={"id": "LampA", "type": "Sphere"}))
+    await upload_series(lamp("LampA", model={"id": "LampA", "type": "Sphere"}))
     assert announced[1:] == [("remove", ["LampC"]), ("update", ["LampA"])], "LampD was added and deleted: no change"
 
     # Requests that open a scene or list types announce the changes first: nothing is left for the timer.

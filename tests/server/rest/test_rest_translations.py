@@ -15,7 +15,7 @@ def put(folder: Path, text: str, language: str = "cs") -> Path:
     return folder
 
 
-def test_translations_of_drivers_are_merged_and_those_of_the_server_win(
+def test_translations_are_merged_and_those_of_the_server_take_precedence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(translations, "LIBRARY", tmp_path / "library")
@@ -27,7 +27,7 @@ def test_translations_of_drivers_are_merged_and_those_of_the_server_win(
 
 
 @pytest.mark.parametrize("language", ["../cs", "CS", "cs.json", ""])
-def test_only_languages_are_looked_for(tmp_path: Path, language: str) -> None:
+def test_an_invalid_language_has_no_translations(tmp_path: Path, language: str) -> None:
     assert translations.into(language, [put(tmp_path, '{"a": "b"}')]) == {}
 
 

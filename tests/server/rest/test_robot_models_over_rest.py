@@ -28,7 +28,7 @@ async def test_every_named_robot_model_is_served(http: httpx.AsyncClient, servic
     refused(await http.delete("/assets/ur5e.zip"), 409, "Conflict", "ur5e.zip")
 
 
-async def test_folders_are_packed_reproducibly_and_archives_are_kept(tmp_path: Path) -> None:
+async def test_folders_are_packed_reproducibly_and_archives_are_unchanged(tmp_path: Path) -> None:
     arm = tmp_path / "urdf" / "arm"
     (arm / "meshes").mkdir(parents=True)
     (arm / "arm.urdf").write_text("<robot/>")
