@@ -86,7 +86,7 @@ class RecordedTypes:
             ],
         }
         self.revision = 1
-        self.news: list[ObjectTypeMeta] = []
+        self.pending: list[ObjectTypeMeta] = []
 
     @property
     def digest(self) -> str:
@@ -94,12 +94,12 @@ class RecordedTypes:
 
     @property
     def up_to_date(self) -> bool:
-        return not self.news
+        return not self.pending
 
     async def refresh(self) -> Changes:
-        news, self.news = self.news, []
-        self._metas |= {meta.type: meta for meta in news}
-        return Changes([], [], news)
+        pending, self.pending = self.pending, []
+        self._metas |= {meta.type: meta for meta in pending}
+        return Changes([], [], pending)
 
     def known(self, name: str) -> bool:
         return name in self._metas

@@ -82,7 +82,7 @@ async def test_jobs_that_wait_are_stored_in_one_commit(journal: Journal, disk: D
     assert [len(jobs) for jobs in disk.commits] == [1, 1, 3]
 
 
-async def test_closing_stores_waiting_values(journal: Journal, path: Path, disk: Disk) -> None:
+async def test_closing_stores_waiting_jobs(journal: Journal, path: Path, disk: Disk) -> None:
     disk.ready.clear()
     waiting = [journal.rebase(scene()), journal.append(edit(1))]
     closing = asyncio.create_task(journal.close())
@@ -156,7 +156,7 @@ async def test_a_caller_that_is_cancelled_does_not_stop_the_journal(journal: Jou
     assert numbers(reopened(path)[0]) == [1, 2]
 
 
-async def test_an_unusable_file_is_named(tmp_path: Path) -> None:
+async def test_the_error_names_an_unusable_file(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "missing" / "journal.sqlite")
     with pytest.raises(StorageError, match=r"The journal .*missing/journal\.sqlite cannot be used"):
         await journal.open()

@@ -101,7 +101,7 @@ def test_a_killed_server_loses_nothing(killed: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["journal.sqlite", "journal.sqlite-wal", "journal.position"])
-def test_a_flipped_byte_is_noticed(killed: Path, tmp_path: Path, name: str) -> None:
+def test_a_flipped_byte_is_harmless_or_reported(killed: Path, tmp_path: Path, name: str) -> None:
     size = (killed / name).stat().st_size
     content = (killed / name).read_bytes()
     used = [at for at in range(size) if content[at]]  # a zero is mostly unused space
@@ -119,7 +119,7 @@ def test_a_flipped_byte_is_noticed(killed: Path, tmp_path: Path, name: str) -> N
     assert losses == 0 if name == "journal.position" else losses > 0
 
 
-def test_a_missing_log_is_noticed(killed: Path, tmp_path: Path) -> None:
+def test_a_missing_log_is_reported(killed: Path, tmp_path: Path) -> None:
     shutil.copytree(killed, tmp_path / "data")
     (tmp_path / "data" / "journal.sqlite-wal").unlink()
     loss = check(tmp_path / "data", "no log")
@@ -131,7 +131,7 @@ def test_a_missing_log_is_noticed(killed: Path, tmp_path: Path) -> None:
     assert Path(loss.stored_as).exists()
 
 
-def test_a_missing_database_is_noticed(killed: Path, tmp_path: Path) -> None:
+def test_a_missing_database_is_reported(killed: Path, tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     shutil.copy(killed / "journal.position", tmp_path / "data")
     loss = check(tmp_path / "data", "no database")
@@ -139,7 +139,7 @@ def test_a_missing_database_is_noticed(killed: Path, tmp_path: Path) -> None:
     assert "scene 'open'" in str(loss.message)
 
 
-def test_a_truncated_log_is_noticed(killed: Path, tmp_path: Path) -> None:
+def test_a_truncated_log_is_harmless_or_reported(killed: Path, tmp_path: Path) -> None:
     for number, part in enumerate((0.02, 0.1, 0.3, 0.6)):
         directory = tmp_path / str(number)
         shutil.copytree(killed, directory)
@@ -148,7 +148,7 @@ def test_a_truncated_log_is_noticed(killed: Path, tmp_path: Path) -> None:
         check(directory, f"{part} of the log")
 
 
-def test_damage_in_changes_that_only_undo_needs(killed: Path, tmp_path: Path) -> None:
+def test_damage_in_changes_that_only_undo_needs_is_not_a_loss_of_the_document(killed: Path, tmp_path: Path) -> None:
     shutil.copytree(killed, tmp_path / "data")
     connection = sqlite3.connect(tmp_path / "data" / "journal.sqlite")
     connection.execute("update edit set user = 'mallory' where number = 7")

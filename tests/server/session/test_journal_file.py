@@ -237,7 +237,7 @@ def test_a_file_of_unknown_format_is_renamed(path: Path, version: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("statement", "kept", "lost"),
+    ("statement", "remaining", "lost"),
     [
         ("update edit set user = 'eve' where number = 5", [1, 2, 3, 4], r"Change 5 of scene 'cell' is lost"),
         ("update edit set sum = 0 where number = 4", [1, 2, 3], r"Changes 4 to 5 of scene 'cell' are lost"),
@@ -250,16 +250,16 @@ def test_a_file_of_unknown_format_is_renamed(path: Path, version: int) -> None:
         ("delete from edit", [], r"Changes 1 to 5 of scene 'cell' are lost"),
     ],
 )
-def test_missing_and_damaged_edits_are_reported(path: Path, statement: str, kept: list[int], lost: str) -> None:
+def test_missing_and_damaged_edits_are_reported(path: Path, statement: str, remaining: list[int], lost: str) -> None:
     change(path, statement)
     found, loss = reopened(path)
-    assert numbers(found) == kept
+    assert numbers(found) == remaining
     assert loss is not None
     assert re.match(lost, loss.lost.text)
     assert loss.incomplete
     assert Path(loss.stored_as).exists()
     found, loss = reopened(path)
-    assert numbers(found) == kept
+    assert numbers(found) == remaining
     assert loss is None
 
 

@@ -24,7 +24,7 @@ from arcor2_server.documents.journal_records import (
 from tests.server.session.test_journal_file import SAVED, edit, scene
 
 
-def test_times_know_whether_something_is_unsaved() -> None:
+def test_times_show_whether_a_document_is_unsaved() -> None:
     never, changed = Times("c", "", "x"), replace(SAVED, changed="x")
     assert [times.unsaved for times in (Times(), never, SAVED, changed)] == [True, True, False, True]
     assert SAVED.after_edit("t", differs=True) == replace(SAVED, changed="t")

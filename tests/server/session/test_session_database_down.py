@@ -21,7 +21,7 @@ async def test_edits_are_kept_and_saved_later(tmp_path: Path, databases: Databas
         with pytest.raises(Refused, match=rf"at 127\.0\.0\.1:{relay.port} cannot be reached: Connection refused"):
             await alice.ask("SaveProject")
 
-    # The server is killed or restarted: without the database it does not start, with it the edit is there.
+    # A server that is restarted with the database restores the edit.
     await relay.open()
     async with open_server(tmp_path, database_url=relay.url) as server:
         assert [point.name for point in server.session.require_project().action_points] == ["first", "second"]

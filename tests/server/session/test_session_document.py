@@ -142,7 +142,7 @@ def _random_edit(document: Document, draw: random.Random) -> list[Change]:
 
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32), length=st.integers(1, 30))
-def test_random_edits_undo_redo_and_replay(seed: int, length: int) -> None:
+def test_random_edits_are_undone_redone_and_replayed(seed: int, length: int) -> None:
     draw = random.Random(seed)
     document = Document.of(*some_project())
     base = encode_rows(document.items())

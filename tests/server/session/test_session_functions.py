@@ -1,4 +1,4 @@
-"""Functions of the open project: made, changed, dissolved, undone, and taken to another project."""
+"""Functions of the open project: creation, changes, dissolving, undo, and import into another project."""
 
 import json
 from typing import Any
@@ -18,17 +18,17 @@ SHOUT = {"name": "text", "type": "string", "value": '"won"'}
 
 @pytest.fixture
 async def work(alice: Person) -> Work:
-    """A program: draw, then pause for a project parameter, and shout if the draw was lucky."""
+    """A program: draw, pause for the time in a project parameter, and pause again if the draw was lucky."""
     work = Work(alice)
     await work.project("here")
-    here = work.point("here")
+    point = work.point("here")
     await alice.ask("AddProjectParameter", name="wait", type="double", value="0.5")
     wait = json.dumps(work.session.document.named("parameter", "wait"))
     await work.add_action(
-        here, "draw", "rnd/random_bool", {"name": "probability", "type": "double", "value": "0.5"}, **STORED
+        point, "draw", "rnd/random_bool", {"name": "probability", "type": "double", "value": "0.5"}, **STORED
     )
-    await work.add_action(here, "pause", "time/sleep", {"name": "seconds", "type": "project_parameter", "value": wait})
-    await work.add_action(here, "again", "time/sleep", {"name": "seconds", "type": "double", "value": "0.1"})
+    await work.add_action(point, "pause", "time/sleep", {"name": "seconds", "type": "project_parameter", "value": wait})
+    await work.add_action(point, "again", "time/sleep", {"name": "seconds", "type": "double", "value": "0.1"})
     for start, end in (("START", "draw"), ("draw", "pause"), ("again", "END")):
         await connect(work, start, end)
     for value, end in (("true", "again"), ("false", "END")):
@@ -45,7 +45,7 @@ def function_of(work: Work, name: str) -> ProjectFunction:
     return next(each for each in project_of(work).functions if each.name == name)
 
 
-async def made(work: Work, name: str = "try_luck", *names: str) -> dict[str, str]:
+async def make_function(work: Work, name: str = "try_luck", *names: str) -> dict[str, str]:
     answer: dict[str, str] = await work.person.ask(
         "MakeFunction", name=name, action_ids=[work.action(each).id for each in names or ("draw", "pause")]
     )
@@ -55,8 +55,8 @@ async def made(work: Work, name: str = "try_luck", *names: str) -> dict[str, str
 async def test_actions_become_a_function_and_return(server: SessionServer, alice: Person, work: Work) -> None:
     before = project_of(work)
     with pytest.raises(Refused, match="lead to again, END"):
-        await made(work)
-    # With the shouting action, the selection has one exit.
+        await make_function(work)
+    # With the action `again`, the selection has one exit.
     wanted = [work.action(name).id for name in ("draw", "pause", "again")]
     assert project_of(work) == before, "a refusal changes nothing"
     await alice.ask("MakeFunction", dry_run=True, name="try_luck", action_ids=wanted)
@@ -74,7 +74,7 @@ async def test_actions_become_a_function_and_return(server: SessionServer, alice
     assert [(each.name, each.type) for each in call.parameters] == [("wait", "project_parameter")]
     assert [(item.start, item.end) for item in project_of(work).logic] == [("START", call.id), (call.id, "END")]
     assert Document.of(server.session.require_scene(), project_of(work)).project is not None
-    assert "FunctionChanged" not in alice.names(), "only subscribers know functions"
+    assert "FunctionChanged" not in alice.names(), "only subscribers get the event"
     [changed] = [event for event in bob.events() if event["event"] == "FunctionChanged"]
     assert changed["change_type"] == "add"
     assert [action["name"] for action in changed["data"]["actions"]] == ["draw", "pause", "again"]
@@ -91,7 +91,7 @@ async def test_actions_become_a_function_and_return(server: SessionServer, alice
     assert project_of(work) == with_function
 
 
-async def test_the_reason_why_actions_cannot_be_a_function(alice: Person, work: Work) -> None:
+async def test_a_refused_function_states_the_reason_as_a_code(alice: Person, work: Work) -> None:
     await work.add_action(work.point("here"), "lone")
     reasons = {
         ("draw", "again"): "several_entries",
@@ -107,7 +107,7 @@ async def test_the_reason_why_actions_cannot_be_a_function(alice: Person, work: 
 
 async def test_parameters_and_results_change_with_all_calls(alice: Person, work: Work) -> None:
     ask = alice.ask
-    await made(work, "try_luck", "draw")
+    await make_function(work, "try_luck", "draw")
     function, call = function_of(work, "try_luck"), work.action("try_luck")
     assert call.outputs() == ["lucky"], "the condition uses it"
     [draw] = function.actions
@@ -178,8 +178,8 @@ async def test_a_function_has_its_own_actions_and_logic(server: SessionServer, a
 async def test_a_function_moves_to_another_project_of_the_scene(alice: Person, work: Work) -> None:
     ask = alice.ask
     await work.add_orientation(work.point("here"), "o")
-    answer = await made(work, "inner", "draw")
-    # `inner` becomes part of `outer`, which therefore brings it along.
+    answer = await make_function(work, "inner", "draw")
+    # `inner` becomes part of `outer`, so it is exported with `outer`.
     await ask("MakeFunction", name="outer", action_ids=[work.action(n).id for n in ("inner", "pause", "again")])
     outer = function_of(work, "outer")
     exported: dict[str, Any] = await ask("ExportFunction", id=outer.id)
@@ -218,7 +218,7 @@ async def test_a_function_moves_to_another_project_of_the_scene(alice: Person, w
 
 
 async def test_a_function_is_changed_in_the_script(alice: Person, work: Work) -> None:
-    await made(work, "try_luck", "draw", "pause", "again")
+    await make_function(work, "try_luck", "draw", "pause", "again")
     before = project_of(work)
     [function] = before.functions
     loaded = await alice.ask("ProjectScript")
@@ -262,7 +262,7 @@ async def test_a_function_is_changed_in_the_script(alice: Person, work: Work) ->
 async def test_clients_that_do_not_know_functions_are_notified(
     server: SessionServer, alice: Person, work: Work
 ) -> None:
-    await made(work, "try_luck", "draw")
+    await make_function(work, "try_luck", "draw")
     await alice.ask("AddProjectParameter", name="count", type="integer", value="0", variable=True)
     await alice.ask("SaveProject")
     await alice.ask("CloseProject")
@@ -280,7 +280,7 @@ async def test_clients_that_do_not_know_functions_are_notified(
 
 
 async def test_functions_survive_a_client_that_does_not_know_them(work: Work) -> None:
-    await made(work, "try_luck", "draw")
+    await make_function(work, "try_luck", "draw")
     stored = project_of(work)
     assert keep_extensions(replace(stored, functions=[]), stored) == stored
     [function] = stored.functions

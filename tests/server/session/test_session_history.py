@@ -8,7 +8,7 @@ import pytest
 
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_server.documents.edit_notifications import label
-from tests.server.session.edits import EDITS, TURNED, Edit, Watcher, make, refused, rich_project, shown
+from tests.server.session.edits import EDITS, TURNED, Edit, Watcher, apply_edit, refused, rich_project, server_content
 from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 from tests.server.session.work import ORIGIN, URL, Work
 
@@ -26,10 +26,10 @@ async def test_every_edit_of_a_project_can_be_undone(
     ids = await rich_project(work)
     ids["project"] = server.session.require_project().id
     await alice.ask("SaveProject")
-    saved, watcher = shown(server), Watcher(server, bob)
+    saved, watcher = server_content(server), Watcher(server, bob)
     for name, edit in EDITS.items():
-        await make(alice, edit, ids)
-        after = shown(server)
+        await apply_edit(alice, edit, ids)
+        after = server_content(server)
         assert after != saved, name
         watcher.apply_events()
         assert server.session.has_changes
@@ -42,15 +42,15 @@ async def test_every_edit_of_a_project_can_be_undone(
         assert events, name
         assert not [event for event in events if "Locked" in event["event"]]
         watcher.apply_events()
-        assert shown(server) == saved, name
+        assert server_content(server) == saved, name
         assert not server.session.has_changes, name
         assert (await alice.ask("Redo"))["request"] == name
         watcher.apply_events()
-        assert shown(server) == after, name
+        assert server_content(server) == after, name
         assert server.session.has_changes
         await alice.ask("Undo")
         watcher.apply_events()
-        assert shown(server) == saved, name
+        assert server_content(server) == saved, name
         assert server.services.locks.locked_roots() == [], name
 
 
@@ -58,41 +58,41 @@ async def test_all_edits_can_be_undone_and_redone_in_a_row(
     server: SessionServer, alice: Person, bob: Person, work: Work
 ) -> None:
     await work.project()
-    watcher, states = Watcher(server, bob), [shown(server)]
+    watcher, states = Watcher(server, bob), [server_content(server)]
     numbered = server.session.revision
     ids = {"a": await work.add_point("a")}
-    states.append(shown(server))
+    states.append(server_content(server))
     ids["b"] = await work.add_point("b", ids["a"])
-    states.append(shown(server))
+    states.append(server_content(server))
     await work.add_action(ids["b"], "act")
-    states.append(shown(server))
+    states.append(server_content(server))
     await alice.ask("AddLogicItem", start="START", end=work.action("act").id)
-    states.append(shown(server))
+    states.append(server_content(server))
     for state in reversed(states[:-1]):
         await alice.ask("Undo")
         watcher.apply_events()
-        assert shown(server) == state
+        assert server_content(server) == state
     with pytest.raises(Refused, match="nothing"):
         await alice.ask("Undo")
     for state in states[1:]:
         await alice.ask("Redo")
         watcher.apply_events()
-        assert shown(server) == state
+        assert server_content(server) == state
     with pytest.raises(Refused, match="nothing"):
         await alice.ask("Redo")
     await alice.ask("RestoreRevision", revision=numbered)
     watcher.apply_events()
-    assert shown(server) == states[0]
+    assert server_content(server) == states[0]
     await alice.ask("Undo")
     watcher.apply_events()
-    assert shown(server) == states[-1]
+    assert server_content(server) == states[-1]
 
 
 async def test_edits_of_one_step_are_undone_and_redone_together(
     server: SessionServer, alice: Person, bob: Person, work: Work
 ) -> None:
     await work.project()
-    before, revision = shown(server), server.session.revision
+    before, revision = server_content(server), server.session.revision
     for name in ("wait", "stop"):
         await alice.ask("AddSceneObject", name=name, type="TimeActions", undo_step=name)
         await alice.ask("AddActionPoint", name=name, position=ORIGIN, undo_step=name)
@@ -103,22 +103,22 @@ async def test_edits_of_one_step_are_undone_and_redone_together(
         await alice.ask("AddAction", **added, flows=[{"type": "default", "outputs": []}], undo_step=name)
         await alice.ask("AddLogicItem", start="START", end=work.action(f"do_{name}").id, undo_step=name)
         if name == "wait":
-            between = shown(server)
+            between = server_content(server)
             await alice.ask("RemoveLogicItem", logic_item_id=server.session.document.project.logic[0].id)
-            unconnected = shown(server)
-    after = shown(server)
+            unconnected = server_content(server)
+    after = server_content(server)
     undoable = server.session.history.undoable("alice")
     assert str(label(undoable, server.session.history)) == "adding the action do_stop"
     edits = (await alice.ask("History"))["edits"]
     assert [edit.get("of") for edit in edits] == [revision + 6] * 3 + [None] + [None] + [revision + 1] * 3 + [None]
     for wanted in (unconnected, between, before):
         await alice.ask("Undo")
-        assert shown(server) == wanted
+        assert server_content(server) == wanted
     with pytest.raises(Refused, match="nothing"):
         await alice.ask("Undo")
     for wanted in (between, unconnected, after):
         await alice.ask("Redo")
-        assert shown(server) == wanted
+        assert server_content(server) == wanted
 
 
 async def test_a_step_does_not_continue_after_an_undo_or_an_edit_of_another_user(
@@ -146,7 +146,7 @@ async def test_every_edit_of_a_scene_can_be_undone(
 ) -> None:
     scene = await work.scene()
     robot = work.object("robot")
-    saved, watcher = shown(server), Watcher(server, bob)
+    saved, watcher = server_content(server), Watcher(server, bob)
     ids = {"robot": robot, "scene": scene}
     edits: list[Edit] = [
         ("AddObjectToScene", {"name": "other", "type": "TimeActions"}, "", False),
@@ -158,12 +158,12 @@ async def test_every_edit_of_a_scene_can_be_undone(
         ("RenameScene", {"id": "@scene", "new_name": "other"}, "@scene", False),
     ]
     for edit in edits:
-        await make(alice, edit, ids)
+        await apply_edit(alice, edit, ids)
         watcher.apply_events()
         assert server.session.has_changes
         assert (await alice.ask("Undo"))["request"] == edit[0]
         watcher.apply_events()
-        assert shown(server) == saved, edit[0]
+        assert server_content(server) == saved, edit[0]
         assert not server.session.has_changes
     await alice.ask("CloseScene")
 
@@ -199,7 +199,7 @@ async def test_the_history_lists_users_and_edits(server: SessionServer, alice: P
     await work.project("p")
     p = work.point("p")
     await bob.ask("AddActionPoint", name="b", position=ORIGIN)
-    await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
+    await apply_edit(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
     await alice.ask("Undo")
     answer = await alice.ask("History")
     assert (answer["revision"], answer["oldest"], answer["undo"], answer["redo"]) == (4, 0, 1, 4)
@@ -225,24 +225,24 @@ async def test_a_revision_can_be_restored_across_users(
     ids = await rich_project(work)
     ids["project"] = server.session.require_project().id
     await alice.ask("SaveProject")
-    saved, revision, watcher = shown(server), server.session.revision, Watcher(server, bob)
+    saved, revision, watcher = server_content(server), server.session.revision, Watcher(server, bob)
     for name in ("AddActionPoint", "UpdateActionPointParent", "RemoveLogicItem", "DeleteOverride", "RenameAction"):
-        await make(alice, EDITS[name], ids)
+        await apply_edit(alice, EDITS[name], ids)
     await Work(bob).add_action(ids["base"], "bobs")
-    after = shown(server)
+    after = server_content(server)
     watcher.apply_events()
     assert await alice.ask("RestoreRevision", dry_run=True, revision=revision) == {"revision": server.session.revision}
-    assert shown(server) == after
+    assert server_content(server) == after
     answer = await alice.ask("RestoreRevision", revision=revision)
     assert answer == {"revision": server.session.revision}
     watcher.apply_events()
-    assert shown(server) == saved
+    assert server_content(server) == saved
     assert not server.session.has_changes
     assert (await alice.ask("History", limit=1))["edits"][0]["of"] == revision
     assert "nothing" not in await refused(alice, "RestoreRevision", revision=revision)
     await alice.ask("Undo")
     watcher.apply_events()
-    assert shown(server) == after
+    assert server_content(server) == after
     for wrong in (-1, server.session.revision + 1):
         assert "can be restored" in await refused(alice, "RestoreRevision", revision=wrong)
 
@@ -343,7 +343,7 @@ async def test_an_undo_that_cannot_be_stored_is_reverted(
 
     await work.project("p")
     await alice.ask("SaveProject")
-    before, history = shown(server), await alice.ask("History")
+    before, history = server_content(server), await alice.ask("History")
 
     def full(connection: sqlite3.Connection, job: object, serial: int) -> None:
         raise sqlite3.OperationalError("database or disk is full")
@@ -351,7 +351,7 @@ async def test_an_undo_that_cannot_be_stored_is_reverted(
     with monkeypatch.context() as patch:
         patch.setattr(journal_file, "write_job", full)
         assert "disk is full" in await refused(alice)
-    assert shown(server) == before
+    assert server_content(server) == before
     assert not server.session.has_changes
     assert await alice.ask("History") == history
     await alice.ask("Undo")
@@ -379,6 +379,6 @@ async def test_a_failed_save_keeps_unsaved_changes(
     assert not server.session.has_changes
 
 
-async def test_older_clients_are_notified_of_undo(alice: Person) -> None:
+async def test_system_info_lists_the_requests_for_undo(alice: Person) -> None:
     answer = await alice.ask("SystemInfo")
     assert {"Undo", "Redo", "History", "RestoreRevision"} <= set(answer["supported_rpc_requests"])

@@ -64,12 +64,12 @@ async def test_acknowledged_edits_survive_a_kill(tmp_path: Path, moment: float) 
         await process.wait()
     async with open_server(tmp_path) as server:
         project = server.session.require_project()
-        kept = [action.name for point in project.action_points for action in point.actions]
-        missing = set(acknowledged) - set(kept)
+        restored = [action.name for point in project.action_points for action in point.actions]
+        missing = set(acknowledged) - set(restored)
         assert not missing
         assert len(acknowledged) >= 50
         # Each client waits for an answer before its next edit: at most one edit of each exists without acknowledgement.
-        assert len(kept) <= len(acknowledged) + 8
+        assert len(restored) <= len(acknowledged) + 8
         assert server.session.project_changed
         assert not server.session.scene_changed
         # It is a document like any other: it can be edited and saved.
@@ -132,7 +132,7 @@ def log(monkeypatch: pytest.MonkeyPatch) -> Log:
     return log
 
 
-async def test_a_killed_start_leaves_nothing_behind(tmp_path: Path, log: Log) -> None:
+async def test_a_table_left_by_a_killed_start_is_removed(tmp_path: Path, log: Log) -> None:
     async with open_server(tmp_path):
         pass
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
@@ -157,7 +157,7 @@ async def test_a_new_scene_survives_without_ever_being_saved(tmp_path: Path) -> 
         assert await server.services.storage.scenes() == []
 
 
-async def test_the_journal_stays_short(tmp_path: Path) -> None:
+async def test_the_size_of_the_journal_is_bounded(tmp_path: Path) -> None:
     async with open_server(tmp_path, history_limit=10) as server:
         alice = await server.person("alice")
         await open_project(alice)
@@ -206,7 +206,7 @@ async def test_a_damaged_journal_is_renamed_and_reported(tmp_path: Path, damage:
         connection.execute(statements[damage])
         connection.commit()
         connection.close()
-    left = ["one"] if damage == "gap" else []
+    remaining = ["one"] if damage == "gap" else []
     async with open_server(tmp_path) as server:
         (notice,) = server.services.damage.notices
         assert "journal.damaged-" in notice.text
@@ -214,10 +214,10 @@ async def test_a_damaged_journal_is_renamed_and_reported(tmp_path: Path, damage:
         greeted = server.services.greeting()[-1].data
         assert greeted.as_message(greeted.message) == notice
         alice = await server.person("alice")
-        if not left:
+        if not remaining:
             assert server.session.greeting(server.cell.state) == []
             await alice.ask("OpenProject", id=key)
-        assert point_names(server)[30:] == left
+        assert point_names(server)[30:] == remaining
         await add_point(alice, "again")
     assert "journal.damaged-" in log.reports[0]
     assert len(list(tmp_path.glob("journal.damaged-*.sqlite"))) == 1
@@ -293,7 +293,9 @@ async def test_the_edit_of_a_cancelled_request_is_kept(server: SessionServer, al
     assert not server.session._pending
 
 
-async def test_a_crash_right_after_saving_leaves_it_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_crash_right_after_saving_keeps_the_saved_state(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     async with open_server(tmp_path) as server:
         alice = await server.person("alice")
         await open_project(alice)

@@ -1,4 +1,4 @@
-"""Lists of saved documents: problems are checked again only where something changed."""
+"""Lists of saved documents: only changed documents are checked for problems again."""
 
 from collections.abc import Sequence
 from typing import Any

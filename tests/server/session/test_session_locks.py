@@ -58,7 +58,7 @@ async def test_update_lock_widens_to_the_tree_and_narrows_to_the_object(alice: P
     assert lock_events(bob)[-1] == ("ObjectsUnlocked", {parent}, "alice")
 
 
-async def test_all_locks_of_a_lost_user_are_released(tmp_path: Path) -> None:
+async def test_all_locks_of_a_disconnected_user_are_released(tmp_path: Path) -> None:
     async with open_server(tmp_path, lock_timeout=0.2) as server:
         alice, bob = await server.person("alice"), await server.person("bob")
         work = Work(alice)

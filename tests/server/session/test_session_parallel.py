@@ -11,7 +11,7 @@ from arcor2_server.documents.document import UNTIMED
 from arcor2_server.documents.extensions import keep_extensions
 from tests.server.session.session_server import Person, Refused
 from tests.server.session.test_session_scripts import STORED, connect
-from tests.server.session.work import NOTHING_KEPT, Work
+from tests.server.session.work import NO_RESULTS, Work
 
 
 @pytest.fixture
@@ -19,11 +19,11 @@ async def work(alice: Person) -> Work:
     """A program: draw, then sleep, then draw again. Draw and sleep are calls of functions."""
     work = Work(alice)
     await work.project("here")
-    here = work.point("here")
+    point = work.point("here")
     probability = {"name": "probability", "type": "double", "value": "0.5"}
-    await work.add_action(here, "draw", "rnd/random_bool", probability, **STORED)
-    await work.add_action(here, "pause", "time/sleep", {"name": "seconds", "type": "double", "value": "0.1"})
-    await work.add_action(here, "again", "rnd/random_bool", probability)
+    await work.add_action(point, "draw", "rnd/random_bool", probability, **STORED)
+    await work.add_action(point, "pause", "time/sleep", {"name": "seconds", "type": "double", "value": "0.1"})
+    await work.add_action(point, "again", "rnd/random_bool", probability)
     for start, end in (("START", "draw"), ("draw", "pause"), ("pause", "again"), ("again", "END")):
         await connect(work, start, end)
     for name in ("draw", "pause"):
@@ -41,7 +41,7 @@ def steps_of(work: Work) -> set[tuple[str, str]]:
     return {(names.get(item.start, item.start), names.get(item.end, item.end)) for item in project_of(work).logic}
 
 
-async def made(work: Work, *names: str) -> Any:
+async def make_parallel(work: Work, *names: str) -> Any:
     ids = [work.action(name).id for name in names or ("do_draw", "do_pause")]
     return await work.person.ask("MakeParallel", name="both", action_ids=ids)
 
@@ -49,8 +49,8 @@ async def made(work: Work, *names: str) -> Any:
 async def test_calls_run_in_parallel_and_return(alice: Person, work: Work) -> None:
     before = project_of(work)
     with pytest.raises(Refused, match="again does not call a function"):
-        await made(work, "do_pause", "again")
-    answer = await made(work, "do_pause", "do_draw")
+        await make_parallel(work, "do_pause", "again")
+    answer = await make_parallel(work, "do_pause", "do_draw")
     parallel = work.action("both")
     assert (parallel.id, parallel.type) == (answer["action_id"], PARALLEL)
     assert parallel.branches == [work.action("do_draw").id, work.action("do_pause").id], "in the order of the program"
@@ -84,12 +84,12 @@ async def test_calls_run_in_parallel_and_return(alice: Person, work: Work) -> No
     assert project_of(work) == before
 
 
-async def test_a_branch_whose_result_is_used_stays(alice: Person, work: Work) -> None:
+async def test_a_branch_whose_result_is_used_cannot_be_removed(alice: Person, work: Work) -> None:
     call = work.action("do_pause")
     await alice.ask(
-        "AddAction", action_point_id=work.point("here"), name="third", type=call.type, parameters=[], flows=NOTHING_KEPT
+        "AddAction", action_point_id=work.point("here"), name="third", type=call.type, parameters=[], flows=NO_RESULTS
     )
-    await made(work)
+    await make_parallel(work)
     parallel, drawn = work.action("both"), work.action("do_draw")
     [draw] = [each for each in project_of(work).functions if each.name == "do_draw"]
     await alice.ask("AddFunctionResult", function_id=draw.id, link=f"{draw.actions[0].id}/default/0")
@@ -115,7 +115,7 @@ async def test_a_branch_whose_result_is_used_stays(alice: Person, work: Work) ->
 
 
 async def test_a_function_contains_parallel_work(alice: Person, work: Work) -> None:
-    await made(work)
+    await make_parallel(work)
     with pytest.raises(Refused, match="both runs do_draw in parallel"):
         await alice.ask("MakeFunction", name="everything", action_ids=[work.action("do_draw").id])
     ids = [work.action(name).id for name in ("both", "again")]
@@ -130,7 +130,7 @@ async def test_a_function_contains_parallel_work(alice: Person, work: Work) -> N
 
 
 async def test_parallel_work_survives_a_client_that_does_not_know_it(work: Work) -> None:
-    await made(work)
+    await make_parallel(work)
     stored = project_of(work)
 
     def without(action: Action) -> Action:

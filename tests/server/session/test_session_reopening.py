@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.geometry import Position
 from arcor2_server.documents import Session, closed_history
 from tests.server.crash_copy import copy_at_one_moment
-from tests.server.session.edits import refused, shown
+from tests.server.session.edits import refused, server_content
 from tests.server.session.session_server import Person, SessionServer, open_server
 from tests.server.session.work import ORIGIN, POSE, Work
 
@@ -148,9 +148,9 @@ async def test_an_edit_right_after_opening_follows_the_stored_history(tmp_path: 
     async with open_server(tmp_path / "killed") as server:
         alice = await server.person("alice")
         assert [edit["number"] for edit in (await alice.ask("History"))["edits"]] == [3, 2, 1]
-        for left in (["a", "b"], ["a"], []):
+        for remaining in (["a", "b"], ["a"], []):
             await alice.ask("Undo")
-            assert points(server) == left
+            assert points(server) == remaining
 
 
 async def test_undo_is_refused_for_items_changed_by_others(server: SessionServer, alice: Person, work: Work) -> None:
@@ -166,9 +166,9 @@ async def test_undo_is_refused_for_items_changed_by_others(server: SessionServer
     assert (points(server), server.session.has_changes) == (["moved", "same", "added"], False)
     newest = (await alice.ask("History"))["edits"][0]
     assert (newest["number"], newest["user"], newest["how"], newest["touched"]) == (4, "", "external", 3)
-    for number, what in ((1, "moved (action point) was changed"), (2, "gone (action point) was removed")):
+    for number, change in ((1, "moved (action point) was changed"), (2, "gone (action point) was removed")):
         text = await refused(alice, "Undo", number=number)
-        assert text == f"{what} since outside the editor, while the document was closed (edit 4)."
+        assert text == f"{change} since outside the editor, while the document was closed (edit 4)."
     await alice.ask("Undo")  # nobody else has changed this one
     assert points(server) == ["moved", "added"]
     await alice.ask("RestoreRevision", revision=3)
@@ -196,7 +196,7 @@ async def test_a_scene_has_a_history_of_its_own(server: SessionServer, alice: Pe
     await alice.ask("CloseProject")
     await alice.ask("OpenScene", id=scene)
     scale = work.object("scale")
-    before = shown(server)
+    before = server_content(server)
     await alice.lock(scale)
     elsewhere = POSE | {"position": {"x": 9.0, "y": 9.0, "z": 9.0}}
     await alice.ask("UpdateObjectPose", object_id=scale, pose=elsewhere)
@@ -210,7 +210,7 @@ async def test_a_scene_has_a_history_of_its_own(server: SessionServer, alice: Pe
     await alice.ask("CloseProject", force=True)
     await alice.ask("OpenScene", id=scene)
     await alice.ask("Undo")
-    assert shown(server) == before
+    assert server_content(server) == before
 
 
 async def test_deleting_a_project_deletes_its_history(server: SessionServer, alice: Person, work: Work) -> None:

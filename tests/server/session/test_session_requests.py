@@ -9,7 +9,7 @@ import pytest
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from tests.server.session.session_server import Person, Refused, SessionServer
-from tests.server.session.work import NOTHING_KEPT, ORIGIN, POSE, SECONDS, UPRIGHT, Work
+from tests.server.session.work import NO_RESULTS, ORIGIN, POSE, SECONDS, UPRIGHT, Work
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def work(alice: Person) -> Work:
 
 # ------------------------------------------------------------------------------------------------ order of events
 async def test_order_of_events_when_documents_open_and_close(server: SessionServer, alice: Person, bob: Person) -> None:
-    server.types.news = [ObjectTypeMeta("NewType"), ObjectTypeMeta("OtherType")]
+    server.types.pending = [ObjectTypeMeta("NewType"), ObjectTypeMeta("OtherType")]
     await alice.ask("NewScene", name="scene")
     bob_sees = bob.take()
     assert [e["event"] for e in bob_sees] == ["ChangedObjectTypes", "OpenScene", "SceneState"]
@@ -220,9 +220,9 @@ async def test_an_action_and_its_connections_are_removed_by_one_edit(
 async def test_an_action_whose_result_is_used_is_not_removed(server: SessionServer, work: Work, alice: Person) -> None:
     await work.project("p")
     point = work.point("p")
-    kept = [{"type": "default", "outputs": ["lucky"]}]
+    flows = [{"type": "default", "outputs": ["lucky"]}]
     half = {"name": "probability", "type": "double", "value": "0.5"}
-    first = await work.add_action(point, "first", "rnd/random_bool", half, flows=kept)
+    first = await work.add_action(point, "first", "rnd/random_bool", half, flows=flows)
     other = await work.add_action(point, "other")
     await alice.ask("AddLogicItem", start=first, end=other)
     await alice.ask("AddLogicItem", start=other, end="END", condition={"what": f"{first}/default/0", "value": "true"})
@@ -232,7 +232,7 @@ async def test_an_action_whose_result_is_used_is_not_removed(server: SessionServ
     assert server.session.require_project().logic == before
 
 
-async def test_changing_the_parent_twice(work: Work, alice: Person) -> None:
+async def test_a_second_change_to_the_same_parent_changes_nothing(work: Work, alice: Person) -> None:
     await work.project("a", "b")
     a, b = work.point("a"), work.point("b")
     await alice.lock(a)
@@ -274,7 +274,7 @@ async def test_moving_a_point_needs_its_tree_and_makes_joints_invalid(
 
 
 # ------------------------------------------------------------------------------------------------ two users
-async def test_two_users_and_one_tree(work: Work, alice: Person, bob: Person) -> None:
+async def test_a_locked_tree_is_protected_from_another_user(work: Work, alice: Person, bob: Person) -> None:
     await work.project("p", "q")
     p, q = work.point("p"), work.point("q")
     await alice.lock(p, tree=True)
@@ -339,17 +339,17 @@ async def test_actions_keep_flows_defaults_and_unique_results(work: Work, alice:
     assert filled["velocity"] == "50.0"
     assert filled["pose"] == f'"{orientation}"'
     half = {"name": "probability", "type": "double", "value": "0.5"}
-    kept = [{"type": "default", "outputs": ["r"]}]
-    dice = await work.add_action(p, "dice", "rnd/random_bool", half, flows=kept)
+    flows = [{"type": "default", "outputs": ["r"]}]
+    dice = await work.add_action(p, "dice", "rnd/random_bool", half, flows=flows)
     with pytest.raises(Refused, match="names a result r already"):
-        await work.add_action(p, "dice2", "rnd/random_bool", half, flows=kept)
+        await work.add_action(p, "dice2", "rnd/random_bool", half, flows=flows)
     with pytest.raises(Refused, match="not within"):
         await work.add_action(p, "fast", "robot/move", pose, {"name": "velocity", "type": "double", "value": "101.0"})
     await alice.ask("AddLogicItem", start="START", end=dice)
     await alice.ask("AddLogicItem", start=dice, end="END", condition={"what": f"{dice}/default/0", "value": "true"})
     await alice.lock(dice)
     with pytest.raises(Refused, match="uses a result"):
-        await alice.ask("UpdateAction", action_id=dice, flows=NOTHING_KEPT)
+        await alice.ask("UpdateAction", action_id=dice, flows=NO_RESULTS)
     await alice.ask("UpdateAction", action_id=dice, flows=[{"type": "default", "outputs": ["renamed"]}])
     assert work.action("dice").outputs() == ["renamed"]
     with pytest.raises(Refused, match="move uses the orientation"):
@@ -362,8 +362,8 @@ async def test_a_copy_refers_to_its_own_items(work: Work, alice: Person) -> None
     below = await work.add_point("below", p)
     orientation = await work.add_orientation(below)
     half = {"name": "probability", "type": "double", "value": "0.5"}
-    kept = [{"type": "default", "outputs": ["r"]}]
-    source = await work.add_action(p, "source", "rnd/random_double", flows=kept)
+    flows = [{"type": "default", "outputs": ["r"]}]
+    source = await work.add_action(p, "source", "rnd/random_double", flows=flows)
     link = {"name": "probability", "type": "link", "value": f'"{source}/default/0"'}
     await work.add_action(below, "linked", "rnd/random_bool", link)
     await work.add_action(p, "move", "robot/move", {"name": "pose", "type": "pose", "value": f'"{orientation}"'})
@@ -398,7 +398,7 @@ async def test_read_locks_end_with_their_items(server: SessionServer, work: Work
     await alice.lock(work.point("p"))
 
 
-async def test_overrides(work: Work, alice: Person) -> None:
+async def test_overrides_are_added_changed_and_removed(work: Work, alice: Person) -> None:
     await work.project()
     robot = work.object("robot")
     await alice.lock(robot)
@@ -554,7 +554,7 @@ async def test_a_dry_run_checks_and_changes_nothing(
     await alice.lock(p)
     await alice.lock(parameter)
     await alice.lock(action)
-    sleep = {"type": f"{work.object('time')}/sleep", "parameters": [SECONDS], "flows": NOTHING_KEPT}
+    sleep = {"type": f"{work.object('time')}/sleep", "parameters": [SECONDS], "flows": NO_RESULTS}
     good: list[tuple[str, dict[str, Any]]] = [
         ("AddActionPoint", {"name": "new", "position": ORIGIN}),
         ("RenameActionPoint", {"action_point_id": p, "new_name": "new"}),

@@ -297,12 +297,12 @@ SCENE = Scene("s", id="scn", objects=[TIME, RANDOM, ROBOT])
         (replace(ROBOT, parameters=[URL, URL]), "twice"),
     ],
 )
-def test_problems_of_scenes(types: RecordedTypes, obj: SceneObject, problem: str) -> None:
+def test_invalid_scenes_have_problems(types: RecordedTypes, obj: SceneObject, problem: str) -> None:
     assert any(problem in p.text for p in scene_problems(Scene("s", objects=[obj]), types))
     assert scene_problems(SCENE, types) == []
 
 
-def test_problems_name_the_type_as_users_know_it(types: RecordedTypes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_problems_contain_the_display_name_of_the_type(types: RecordedTypes, monkeypatch: pytest.MonkeyPatch) -> None:
     named = replace(types.meta("TimeActions"), display_name="Wall clock")
     monkeypatch.setattr(types, "meta", lambda _: named)
     scene = Scene("s", objects=[SceneObject("x", "TimeActions", Pose(), [], "o")])
@@ -326,11 +326,11 @@ def test_problems_name_the_type_as_users_know_it(types: RecordedTypes, monkeypat
         (replace(project(), scene_id="other"), "another scene"),
     ],
 )
-def test_problems_of_projects(types: RecordedTypes, wrong: Project, problem: str) -> None:
+def test_invalid_projects_have_problems(types: RecordedTypes, wrong: Project, problem: str) -> None:
     found = project_problems(SCENE, wrong, types)
     assert len(found) >= 1
     assert any(problem in p.text for p in found), found
-    assert all(p.values for p in found), "each names an item, which stays out of the key"
+    assert all(p.values for p in found), "the name of the item is in the key, not in the values"
 
 
 @pytest.mark.parametrize(
@@ -351,7 +351,7 @@ def test_problems_of_projects(types: RecordedTypes, wrong: Project, problem: str
         (("double", "0.25"), ""),
     ],
 )
-def test_parameters_of_actions(types: RecordedTypes, parameter: tuple[str, str], reason: str) -> None:
+def test_invalid_action_parameters_are_problems(types: RecordedTypes, parameter: tuple[str, str], reason: str) -> None:
     def random(name: str, method: str, *outputs: str) -> Action:
         given = [ActionParameter("probability", "double", "0.5")] if method == "random_bool" else []
         return Action(name, f"obj_r/{method}", f"act_{name}", given, [Flow(outputs=list(outputs))])
@@ -425,7 +425,7 @@ def same(one: Pose, other: Pose) -> bool:
     below=Pose(Position(2, 2, 2)),
     order=["obj_b"],
 )
-def test_nothing_moves_when_the_parent_changes(
+def test_poses_in_the_world_are_kept_when_the_parent_changes(
     first: Pose, second: Pose, local: Pose, below: Pose, order: list[str]
 ) -> None:
     scene = Scene(
@@ -490,7 +490,7 @@ def test_rotating_a_parent_rotates_its_children() -> None:
     changes, changed = changes_for_parent(document, "acp", "obj_a")
     document.apply(changes)
     assert changed == ["acp", "c"]
-    # Computed by hand: seen from the object, whose x axis points along the world's y axis.
+    # Computed by hand in the frame of the object, whose x axis points along the world's y axis.
     assert document.action_point("acp").position.distance_to(Position(1, 0, 0)) < 1e-12
     assert document.action_point("c").position.distance_to(Position(0, -1, 0)) < 1e-12
     assert document.orientation("ori")[1].orientation.angle_to(turned.orientation.inverted()) < 1e-12
@@ -504,7 +504,7 @@ def test_a_descendant_as_parent_is_refused() -> None:
             changes_for_parent(document, "a", parent)
 
 
-def test_a_project_after_an_object_was_removed() -> None:
+def test_removing_an_object_adapts_its_projects() -> None:
     """Points keep their poses in the world; the object's actions are removed, with their connections and overrides."""
     turned = Pose(Position(1, 2, 3), Orientation.from_rotation_vector(0, 0, 1))
     scale = SceneObject("scale", "WeighingMachine", turned, [], "obj_s")
@@ -515,9 +515,9 @@ def test_a_project_after_an_object_was_removed() -> None:
         logic=[step("START", "act_w"), step("act_w", "act_x"), step("act_x", "END")],
     )
     after = project_after(scene, before, removed=["obj_s"], moved=[])
-    where = global_pose(Document.of(scene, before), before.action_points[0])
+    world_pose = global_pose(Document.of(scene, before), before.action_points[0])
     assert after.action_points[0].parent is UNSET
-    assert after.action_points[0].position.distance_to(where.position) < 1e-9
+    assert after.action_points[0].position.distance_to(world_pose.position) < 1e-9
     assert [action.name for action in after.action_points[0].actions] == ["x"]
     assert [item.id for item in after.logic] == ["act_x>END"]
     assert project_after(scene, before, removed=["other"], moved=[]) is before

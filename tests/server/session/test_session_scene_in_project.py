@@ -121,7 +121,7 @@ async def test_settings_and_shapes_change_only_offline(server: SessionServer, wo
     await alice.ask("UpdateSceneObjectSettings", id=scale, parameters=[])
 
 
-async def test_an_object_runs_on_a_node(server: SessionServer, work: Work, alice: Person) -> None:
+async def test_the_node_of_an_object_is_stored_and_undone(server: SessionServer, work: Work, alice: Person) -> None:
     await work.project()
     scale = work.object("scale")
     await alice.ask("SetObjectNode", id=scale, node="press")

@@ -14,11 +14,11 @@ async def work(alice: Person) -> Work:
     """Create a program: sleep, then draw, followed by another pause or by the end."""
     work = Work(alice)
     await work.project("here")
-    here = work.point("here")
+    point = work.point("here")
     probability = {"name": "probability", "type": "double", "value": "0.5"}
-    await work.add_action(here, "pause")
-    await work.add_action(here, "draw", "rnd/random_bool", probability, **STORED)
-    await work.add_action(here, "again")
+    await work.add_action(point, "pause")
+    await work.add_action(point, "draw", "rnd/random_bool", probability, **STORED)
+    await work.add_action(point, "again")
     steps = [("START", "pause"), ("pause", "draw"), ("again", "END")]
     for start, end in steps:
         await connect(work, start, end)
@@ -113,7 +113,7 @@ async def test_comments_of_a_script_survive_edits_on_a_tablet(
     alice.take()
     await alice.ask("ImportScript", script=commented, revision=loaded["revision"])
     events = alice.events()
-    assert not any("Let the paint dry" in str(event) for event in events), "clients of the original receive no text"
+    assert not any("Let the paint dry" in str(event) for event in events), "legacy clients receive the text"
     assert any(event["event"] == "ProjectChanged" for event in events)
     imported = await alice.ask("ProjectScript")
     assert imported["script"] == commented

@@ -37,7 +37,7 @@ MODULES = {
         scene_objects,
     )
 }
-OURS = sorted(name for name, module in DECLARED.items() if module in MODULES and not RPCS[name].additional)
+EDITING_REQUESTS = sorted(name for name, module in DECLARED.items() if module in MODULES and not RPCS[name].additional)
 REASONS = {
     "needs a registered user": "not logged in",
     "needs an open scene": "is open: open one first",
@@ -84,8 +84,8 @@ def request(name: str) -> dict[str, Any]:
 
 
 def test_every_request_is_in_the_matrix() -> None:
-    assert len(OURS) >= 55
-    assert set(OURS) <= STATES["no_scene"].keys()
+    assert len(EDITING_REQUESTS) >= 55
+    assert set(EDITING_REQUESTS) <= STATES["no_scene"].keys()
 
 
 @pytest.mark.parametrize("state", ["unregistered_no_scene", "no_scene", "scene_offline"])
@@ -96,7 +96,7 @@ async def test_requests_are_refused_for_the_recorded_reason(
         await alice.ask("NewScene", name="scene")
     person = stranger if state.startswith("unregistered") else alice
     wrong, compared = {}, 0
-    for name in OURS:
+    for name in EDITING_REQUESTS:
         recorded = STATES[state][name].removeprefix("refused: ")
         answer = await person.send(request(name))
         text = "ok" if answer["result"] else answer["messages"][0]

@@ -51,10 +51,12 @@ def plain(value: Any, key: str = "") -> Any:
     """Remove what may differ: texts, times, and order where it has no meaning."""
     match value:
         case dict():
-            kept = {k: plain(v, k) for k, v in value.items() if k not in ("created", "modified", "int_modified", "t")}
-            if "description" in kept:
-                kept["description"] = ""
-            return kept
+            compared = {
+                k: plain(v, k) for k, v in value.items() if k not in ("created", "modified", "int_modified", "t")
+            }
+            if "description" in compared:
+                compared["description"] = ""
+            return compared
         case list() if key == "object_ids":
             return sorted(value)
         case list() if key == "data" and all("name" in item for item in value):
@@ -74,16 +76,16 @@ def plain(value: Any, key: str = "") -> Any:
 
 def exchanges(name: str) -> Iterator[tuple[str, dict[str, Any], dict[str, list[dict[str, Any]]]]]:
     """Return each request with the messages that every client received before the next one."""
-    who, request = "", {}
+    client, request = "", {}
     received: dict[str, list[dict[str, Any]]] = {"A": [], "B": []}
     for line in session(name):
         if line["who"].endswith(">"):
             if request:
-                yield who, request, received
-            who, request, received = line["who"][0], line["msg"], {"A": [], "B": []}
+                yield client, request, received
+            client, request, received = line["who"][0], line["msg"], {"A": [], "B": []}
         elif line["who"][0] in received:
             received[line["who"][0]].append(line["msg"])
-    yield who, request, received
+    yield client, request, received
 
 
 async def play(
@@ -98,13 +100,13 @@ async def play(
     `differs` states why a request is sent without comparing; `only` selects requests by their numbers.
     """
     compared = 0
-    for who, request, recorded in exchanges(name):
+    for client, request, recorded in exchanges(name):
         number = request["id"]
         if only is not None and number not in only:
             continue
         for person in people.values():
             person.take()
-        await people[who].send(mapping.to_ours(request))
+        await people[client].send(mapping.to_ours(request))
         for other, person in people.items():
             got, expected = person.take(), recorded[other]
             if request["request"] == "CopyActionPoint":
@@ -131,7 +133,9 @@ def recorded_answer(name: str, number: int) -> Any:
     return next(m["msg"]["data"] for m in session(name) if m["msg"].get("id") == number and "data" in m["msg"])
 
 
-async def test_the_recorded_session_gives_the_same_messages(server: SessionServer, people: dict[str, Person]) -> None:
+async def test_the_recorded_session_results_in_the_same_messages(
+    server: SessionServer, people: dict[str, Person]
+) -> None:
     """A scene is created, changed by a robot, gets a project that is edited offline and online; all is deleted."""
     mapping, robot = Mapping(), "03_scene_online_robot"
     assert await play("02_scene", people, mapping) == 78

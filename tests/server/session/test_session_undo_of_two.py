@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from arcor2_hw.data.role import Role
-from tests.server.session.edits import make, refused
+from tests.server.session.edits import apply_edit, refused
 from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, Work
 
@@ -18,7 +18,7 @@ def work(alice: Person) -> Work:
 async def test_undo_reverts_only_own_edits(server: SessionServer, alice: Person, bob: Person, work: Work) -> None:
     await work.project("a", "b")
     a, b = work.point("a"), work.point("b")
-    await make(alice, ("RenameActionPoint", {"action_point_id": a, "new_name": "a2"}, a, False), {})
+    await apply_edit(alice, ("RenameActionPoint", {"action_point_id": a, "new_name": "a2"}, a, False), {})
     await bob.lock(b)
     await bob.ask("RenameActionPoint", action_point_id=b, new_name="b2")
     await alice.ask("Undo")
@@ -40,7 +40,7 @@ async def test_undo_reverts_only_own_edits(server: SessionServer, alice: Person,
 async def test_undo_is_refused_with_the_name_of_the_later_author(alice: Person, bob: Person, work: Work) -> None:
     await work.project("p")
     p = work.point("p")
-    await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
+    await apply_edit(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
     await bob.lock(p, tree=True)
     await bob.ask("UpdateActionPointPosition", action_point_id=p, new_position={"x": 9.0, "y": 0.0, "z": 0.0})
     await bob.ask("WriteUnlock", object_id=p)
@@ -65,7 +65,7 @@ async def test_undo_is_refused_when_others_use_the_item(
     assert "bob" in await refused(alice)
     await bob.ask("RemoveAction", id=action)
     await alice.ask("Undo")
-    # A name that is in use meanwhile.
+    # Another point has the name.
     await builder.add_point("p")
     assert "bob" in await refused(alice, "Redo")
     await bob.ask("Undo")
@@ -111,7 +111,7 @@ async def test_undo_is_refused_while_others_hold_locks(
     await work.project("p")
     p = work.point("p")
     below = await work.add_point("below", p)
-    await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
+    await apply_edit(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
     await bob.lock(p)
     assert "bob" in await refused(alice)
     await bob.ask("WriteUnlock", object_id=p)
@@ -129,7 +129,7 @@ async def test_undo_is_refused_while_others_hold_locks(
     await bob.ask("ReadLock", object_id=below)
     assert "bob" in await refused(alice)
     await bob.ask("ReadUnlock", object_id=below)
-    # Locks of the same user do not prevent it, and stay.
+    # Locks of the same user do not prevent an undo, and are not released.
     await alice.lock(p, tree=True)
     await alice.ask("Undo")
     assert server.services.locks.write_locked_by("alice") == [p]
@@ -142,7 +142,7 @@ async def test_locks_follow_removed_and_moved_items(
 ) -> None:
     await work.project("a", "b")
     a, b = work.point("a"), work.point("b")
-    await make(
+    await apply_edit(
         alice, ("UpdateActionPointParent", {"action_point_id": a, "new_parent_id": b}, a, False), {}
     )  # fmt: skip
     await alice.lock(a)
@@ -163,7 +163,7 @@ async def test_two_simultaneous_undos_revert_two_edits(server: SessionServer, al
     await work.project("p")
     p = work.point("p")
     for name in ("q", "r", "s"):
-        await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": name}, p, False), {})
+        await apply_edit(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": name}, p, False), {})
     answers = await asyncio.gather(alice.ask("Undo"), alice.ask("Undo"))
     assert answers[0]["number"] == answers[1]["number"] + 1
     assert work.point("q") == p

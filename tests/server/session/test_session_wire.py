@@ -55,9 +55,9 @@ async def test_acknowledged_edits_survive_a_kill_of_the_server(tmp_path: Path) -
         event = await owner.next_event()
         assert event.event == "OpenProject"
         assert isinstance(event.data, OpenProjectData)
-        kept = [action.name for point in event.data.project.action_points for action in point.actions]
-        assert set(acknowledged) <= set(kept)
-        assert len(kept) <= len(acknowledged) + EDITORS
+        restored = [action.name for point in event.data.project.action_points for action in point.actions]
+        assert set(acknowledged) <= set(restored)
+        assert len(restored) <= len(acknowledged) + EDITORS
         state = await owner.next_event()
         assert (state.event, state.data.state) == ("SceneState", "stopped")
         # Locks are not restored, unsaved changes are.
@@ -66,7 +66,7 @@ async def test_acknowledged_edits_survive_a_kill_of_the_server(tmp_path: Path) -
         await owner.call("SaveProject")
         await owner.call("CloseProject", CloseProjectArgs())
         saved = await owner.call("GetProject", {"id": event.data.project.id})
-        assert [action.name for point in saved.action_points for action in point.actions] == kept
+        assert [action.name for point in saved.action_points for action in point.actions] == restored
 
 
 async def _scene(owner: Client):  # type: ignore[no-untyped-def]

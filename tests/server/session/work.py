@@ -9,7 +9,7 @@ ORIGIN = {"x": 0.0, "y": 0.0, "z": 0.0}
 UPRIGHT = POSE["orientation"]
 URL = {"name": "url", "type": "string", "value": '"http://127.0.0.1:5018"'}
 SECONDS = {"name": "seconds", "type": "double", "value": "0.5"}
-NOTHING_KEPT = [{"type": "default", "outputs": []}]
+NO_RESULTS = [{"type": "default", "outputs": []}]
 
 
 class Work:
@@ -66,7 +66,7 @@ class Work:
             "name": name,
             "type": f"{self.object(obj)}/{action}",
             "parameters": list(given) or ([SECONDS] if action == "sleep" else []),
-            "flows": NOTHING_KEPT,
+            "flows": NO_RESULTS,
         }
         await self.person.ask("AddAction", **(arguments | fields))
         return str(self.action(name).id)
