@@ -32,8 +32,8 @@ from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.process import CellHost
 from benchmarks.metrics import Metric, Report, percentile
 from benchmarks.node_echo import SUBJECT, Frames, context, zenoh_session
+from tests.ports import free_port
 from tests.runtime.conftest import HEADER, Package, open_scene, scene_object, type_code
-from tests.server.fleet.broker import free_port
 from tests.server.nodes.cable import Cable, CannotIsolate
 from tests.server.nodes.conftest import NODE, Broker, Node
 from tests.server.nodes.test_cut_cable import cut_and_heal

@@ -6,7 +6,6 @@ import json
 import random
 import re
 import signal
-import socket
 import zipfile
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
@@ -26,6 +25,7 @@ from arcor2_hw.data.parts import PartCounts, PlaceKind
 from arcor2_server.demo.workplace import confirm_emptied
 from tests.demo.running import Run, demo
 from tests.e2e.harness import until
+from tests.ports import free_port
 from tests.waiting import WITHIN
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -80,12 +80,6 @@ class Cell:
                     problem = event.data.message
                 case "PackageState" if event.data.state is PackageStateEnum.STOPPED:
                     return problem
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 async def watch(url: str, results: list[bool], order: list[str]) -> None:

@@ -18,8 +18,9 @@ from arcor2_hw.messages import Message
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
 from arcor2_server.fleet.summaries import of_alarm, of_unit
 from tests.editor.screen import FONTS, Screen, screen_of
+from tests.ports import free_port
 from tests.server.core.serving import running
-from tests.server.fleet.broker import Server, free_port
+from tests.server.fleet.broker import Server
 from tests.server.fleet.cells import unit
 from tests.server.fleet.test_reports import received
 from tests.server.fleet.test_results import FleetProcess

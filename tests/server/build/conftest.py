@@ -1,5 +1,9 @@
 """The object types of the workplace as code: two uploaded, one of a driver with its own folder, one of this library."""
 
+import os
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,6 +13,9 @@ from arcor2_server.object_types.catalog import PackageType
 from tests.server.build import workplace
 
 STOCK = Path(arcor2_hw.objects.__file__).parent / "stock"
+ROOT = Path(__file__).parents[3]
+
+Mypy = Callable[[Path], list[str]]
 
 
 def make_code(directory: Path) -> list[PackageType]:
@@ -36,3 +43,28 @@ def code(tmp_path: Path) -> list[PackageType]:
 @pytest.fixture
 def driver(code: list[PackageType]) -> PackageType:
     return code[1]
+
+
+@pytest.fixture
+def mypy(pytestconfig: pytest.Config) -> Mypy:
+    """Return a function that runs mypy on a package and its module `wrong`, and returns the lines of the output."""
+    assert pytestconfig.cache is not None
+    cache = pytestconfig.cache.mkdir("mypy_packages")
+
+    def check(package: Path) -> list[str]:
+        done = subprocess.run(
+            [
+                *(sys.executable, "-m", "mypy", "--strict", "--config-file=", "--no-error-summary"),
+                *("--cache-dir", str(cache), "--explicit-package-bases"),
+                *("script.py", "action_points.py", "object_types", "wrong.py"),
+            ],
+            cwd=package,
+            env={**os.environ, "MYPYPATH": f"{package}:{ROOT}"},
+            capture_output=True,
+            text=True,
+            timeout=110,
+        )
+        assert not done.stderr, done.stderr
+        return done.stdout.splitlines()
+
+    return check

@@ -216,6 +216,16 @@ Oracle = Callable[[str, int], tuple[bool, ...]]
 """Return the results of the n-th action that runs."""
 
 
+def random_oracle(seed: int) -> Oracle:
+    """Return an oracle whose results are random, and the same for the same seed."""
+
+    def results(name: str, number: int) -> tuple[bool, ...]:
+        rng = random.Random(f"{seed} {name} {number}")
+        return rng.random() < 0.5, rng.random() < 0.5
+
+    return results
+
+
 def given(method: str, drawn: tuple[bool, ...]) -> tuple[Any, ...]:
     """Return the results of a method, chosen by the values of an oracle."""
     match method:

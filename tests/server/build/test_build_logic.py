@@ -22,6 +22,7 @@ from tests.server.build.projects import (
     TYPES,
     Draft,
     random_draft,
+    random_oracle,
     run,
     same_runs,
     with_choices,
@@ -48,15 +49,7 @@ def test_a_program_does_what_its_logic_defines(
     if exits:
         draft = with_exits(draft, random.Random(seed))
     for draw in range(4):
-        same_runs(draft, _oracle(seed + draw), 4 * size)
-
-
-def _oracle(seed: int) -> Any:
-    def results(name: str, number: int) -> tuple[bool, ...]:
-        rng = random.Random(f"{seed} {name} {number}")
-        return rng.random() < 0.5, rng.random() < 0.5
-
-    return results
+        same_runs(draft, random_oracle(seed + draw), 4 * size)
 
 
 def test_programs_of_large_graphs_do_what_their_logic_defines() -> None:
@@ -64,7 +57,7 @@ def test_programs_of_large_graphs_do_what_their_logic_defines() -> None:
     for size in (200, 400):
         for merging, window in ((0.3, 5), (0.6, 50), (0.05, 3)):
             draft = random_draft(rng, size, merging, 0.05, window)
-            same_runs(draft, _oracle(rng.randrange(1000)), 3 * size)
+            same_runs(draft, random_oracle(rng.randrange(1000)), 3 * size)
 
 
 # ------------------------------------------------------------------------------------------------ shapes
@@ -177,7 +170,7 @@ if next_action == "e":
 thing.do(an="f")"""
     )
     for seed in range(8):
-        same_runs(draft, _oracle(seed), 12)
+        same_runs(draft, random_oracle(seed), 12)
 
 
 def nested(depth: int) -> Draft:
@@ -195,7 +188,7 @@ def test_deeply_nested_branches_become_functions(depth: int) -> None:
     deepest = max(len(line) - len(line.lstrip()) for line in draft.script().splitlines()) // 4
     assert deepest <= MAX_NESTING + 4
     for seed in range(3):
-        same_runs(draft, _oracle(seed), 60)
+        same_runs(draft, random_oracle(seed), 60)
     # The path to the innermost branch, which random values hardly ever take.
     same_runs(draft, lambda *_: (True, True), 3 * depth)
 
@@ -239,7 +232,7 @@ def ladder(count: int) -> Draft:
 def test_a_long_chain_is_built(make: Any, count: int) -> None:
     draft = make(count)
     for seed in range(3):
-        same_runs(draft, _oracle(seed), 1000)
+        same_runs(draft, random_oracle(seed), 1000)
     same_runs(draft, lambda *_: (True, True), 1000)
     same_runs(draft, lambda *_: (False, False), 1000)
 
@@ -332,7 +325,7 @@ def test_the_refusal_of_invalid_logic_names_the_action(draft: Draft, text: str) 
 def test_unreachable_actions_are_omitted() -> None:
     draft = Draft().chain(START, "a", END).chain("lost", "also lost")
     assert "lost" not in draft.script()
-    assert run(draft.script(), _oracle(0), 2) == [("a", ()), ("a", ())]
+    assert run(draft.script(), random_oracle(0), 2) == [("a", ()), ("a", ())]
 
 
 # ------------------------------------------------------------------------------------------------ numbers and texts
@@ -361,27 +354,27 @@ else:
 
 thing.do(an="z")"""
     )
-    same_runs(draft, _oracle(1), 60)
+    same_runs(draft, random_oracle(1), 60)
 
 
 def test_a_choice_between_texts_compares_strings() -> None:
     draft = choosing("low", "high", None)
     assert 'if r == "low":' in draft.script()
-    same_runs(draft, _oracle(2), 60)
+    same_runs(draft, random_oracle(2), 60)
 
 
 def test_a_default_branch_to_the_end_is_omitted() -> None:
     draft = Draft(methods={"a": "count"}).action("a", "r").edge(START, "a").action("b")
     draft.edge("a", "b", ("a", "r", 1)).edge("a", END).edge("b", END)
     assert loop(draft.script()).splitlines()[1:] == ["if r == 1:", '    thing.do(an="b")']
-    same_runs(draft, _oracle(3), 40)
+    same_runs(draft, random_oracle(3), 40)
 
 
 def test_a_default_branch_inverts_the_only_condition() -> None:
     draft = Draft(methods={"a": "count"}).action("a", "r").edge(START, "a").action("b").chain("b", "z", END)
     draft.edge("a", "z", ("a", "r", 1)).edge("a", "b")
     assert loop(draft.script()).splitlines()[1:3] == ["if r != 1:", '    thing.do(an="b")']
-    same_runs(draft, _oracle(4), 40)
+    same_runs(draft, random_oracle(4), 40)
 
 
 @pytest.mark.parametrize(
@@ -459,7 +452,7 @@ def test_comparisons_become_conditions() -> None:
         "else:",
         '    thing.do(an="b3")',
     ]
-    same_runs(draft, _oracle(1), 60)
+    same_runs(draft, random_oracle(1), 60)
 
 
 def pair(what: str, operator: str, other: str) -> LogicComparison:
@@ -474,7 +467,7 @@ def test_two_values_are_compared() -> None:
         "elif x < n and passed:",
         '    thing.do(an="b1")',
     ]
-    same_runs(draft, _oracle(4), 60)
+    same_runs(draft, random_oracle(4), 60)
     comparing([pair(N, "<", LIMIT)], [pair(LIMIT, "<=", N)]).script()
     # Two values may be in any order, between constants or outside of them.
     high = [compared(N, ">", 5), compared(LIMIT, ">", 5)]
@@ -492,7 +485,7 @@ def test_many_comparisons_are_written_one_per_line() -> None:
 def test_complete_comparisons_need_no_default_branch() -> None:
     draft = comparing([compared(N, "<=", 0)], [compared(N, "==", 1)], [compared(N, ">=", 2)])
     assert "else:" in draft.script()
-    same_runs(draft, _oracle(2), 60)
+    same_runs(draft, random_oracle(2), 60)
     passed, failed = [compared(P, "==", True)], [compared(P, "==", False), compared(LIMIT, ">", 0)]
     comparing(passed, failed, [compared(LIMIT, "<", 1)]).script()
     # Overlapping conditions apply in their order, also when the first one leads to the next action of the program.
@@ -500,7 +493,7 @@ def test_complete_comparisons_need_no_default_branch() -> None:
     overlapping.edge("a", "z").edge("a", "b").chain("b", "z", END)
     overlapping.whens = {1: LogicWhen([compared(N, "<", 2)]), 2: LogicWhen([compared(N, ">=", 1)])}
     assert "if not n < 2:" in overlapping.script()
-    same_runs(overlapping, _oracle(3), 60)
+    same_runs(overlapping, random_oracle(3), 60)
 
 
 @pytest.mark.parametrize(

@@ -32,9 +32,8 @@ from arcor2_server.rpc.build import BuildRequests
 from arcor2_server.rpc.registry import Context
 from arcor2_server.storage import Storage, package_versions
 from tests.server.build import hub, workplace
-from tests.server.build.conftest import STOCK
+from tests.server.build.conftest import STOCK, Mypy
 
-ROOT = Path(__file__).parents[3]
 MODELS = {"table": ObjectModel(Model3dType.BOX, box=Box("table", 1.0, 1.0, 0.02))}
 
 
@@ -192,25 +191,13 @@ def test_a_package_runs_on_its_own_code(directory: Path, driver: PackageType) ->
     assert used[0]["action_point_ids"] == ["acp_good"]
 
 
-def test_a_type_checker_accepts_a_package(directory: Path, pytestconfig: pytest.Config) -> None:
-    assert pytestconfig.cache is not None
+def test_a_type_checker_accepts_a_package(directory: Path, mypy: Mypy) -> None:
     (directory / "wrong.py").write_text(
         "from action_points import ActionPoints\n\n\ndef use(aps: ActionPoints) -> None:\n    aps.good.poses.nope\n"
     )
-    done = subprocess.run(
-        [
-            *(sys.executable, "-m", "mypy", "--strict", "--config-file=", "--no-error-summary"),
-            *("--cache-dir", str(pytestconfig.cache.mkdir("mypy_packages")), "--explicit-package-bases"),
-            *("script.py", "action_points.py", "object_types", "wrong.py"),
-        ],
-        cwd=directory,
-        env={**os.environ, "MYPYPATH": f"{directory}:{ROOT}"},
-        capture_output=True,
-        text=True,
-        timeout=110,
-    )
-    assert [line.split(":")[0] for line in done.stdout.splitlines()] == ["wrong.py"], done.stdout + done.stderr
-    assert '"GoodPoses" has no attribute "nope"' in done.stdout
+    found = mypy(directory)
+    assert [line.split(":")[0] for line in found] == ["wrong.py"], found
+    assert '"GoodPoses" has no attribute "nope"' in found[0]
 
 
 def test_the_check_lists_different_versions(directory: Path) -> None:

@@ -3,7 +3,6 @@
 import dataclasses
 import random
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, assume, given, settings, strategies as st
@@ -30,6 +29,7 @@ from tests.server.build.projects import (
     TypesOfTests,
     exits_of,
     random_draft,
+    random_oracle,
     run,
     walk,
     with_choices,
@@ -41,14 +41,6 @@ from tests.server.build.projects import (
     with_variables,
     without_doubles,
 )
-
-
-def _oracle(seed: int) -> Any:
-    def results(name: str, number: int) -> tuple[bool, ...]:
-        rng = random.Random(f"{seed} {name} {number}")
-        return rng.random() < 0.5, rng.random() < 0.5
-
-    return results
 
 
 @settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -84,9 +76,9 @@ def test_a_script_round_trips_to_the_same_project(
     [point] = project.action_points
     fresh = from_script(source, SCENE, replace(project, action_points=[replace(point, actions=[])], logic=[]), TYPES)
     for draw in range(3):
-        expected = walk(project, _oracle(seed + draw), 3 * size)
-        assert walk(back, _oracle(seed + draw), 3 * size) == expected, source
-        assert walk(fresh, _oracle(seed + draw), 3 * size) == expected, source
+        expected = walk(project, random_oracle(seed + draw), 3 * size)
+        assert walk(back, random_oracle(seed + draw), 3 * size) == expected, source
+        assert walk(fresh, random_oracle(seed + draw), 3 * size) == expected, source
 
 
 @settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -115,7 +107,7 @@ def test_functions_round_trip_and_do_what_their_actions_did(
     source = from_logic(SCENE, project, TYPES)
     assert from_script(source, SCENE, project, TYPES) == project, source
     for draw in range(3):
-        oracle = _oracle(seed + draw)
+        oracle = random_oracle(seed + draw)
         ran = run(source, oracle, 3 * size, exits_of(project))
         assert ran == walk(flat, oracle, 3 * size), source
 
@@ -166,7 +158,7 @@ def test_parallel_work_round_trips_and_does_what_its_calls_did(
     assume(parallel)
     source = from_logic(scene, project, TYPES)
     assert from_script(source, scene, project, TYPES) == project, source
-    oracle = _oracle(seed)
+    oracle = random_oracle(seed)
     ran = run(source, oracle, 3 * size, exits_of(project))
     assert ran == walk(flat, oracle, 3 * size), source
 
@@ -217,6 +209,13 @@ def point_of(project: Project, name: str) -> str:
 
 def values_of(project: Project, name: str) -> dict[str, tuple[str, str]]:
     return {one.name: (one.type, one.value) for one in actions_of(project)[name].parameters}
+
+
+def facts_with_count() -> dict[str, TypeFacts]:
+    """Return the types of the workplace with another action, which returns a number."""
+    flow = workplace.FACTS["FlowActions"]
+    actions = {**flow.actions, "count": ObjectAction("count", returns=["integer"])}
+    return {**workplace.FACTS, "FlowActions": dataclasses.replace(flow, actions=actions)}
 
 
 def steps_of(project: Project) -> list[tuple[str, str, str]]:
@@ -413,9 +412,7 @@ def test_conditions_on_numbers_and_texts_with_else() -> None:
     pack = '            robot.place(aps.good.poses.default, an="pack")\n'
     counted = PICK + '        n = flow.count(an="count")\n'
     before = workplace.project()
-    facts = {**workplace.FACTS}
-    more = {**facts["FlowActions"].actions, "count": ObjectAction("count", returns=["integer"])}
-    facts["FlowActions"] = TypeFacts("object_types.flow_actions", "Program flow", more)
+    facts = facts_with_count()
 
     def steps(branches: str) -> list[tuple[str, str, str]]:
         source = edited((PICK, counted + branches))
@@ -672,8 +669,6 @@ def test_unusual_scripts_are_read_or_refused() -> None:
     source = edited(
         (BACK, f'        n = flow.count(an="count")\n        if n == 0:\n            pass\n{branches}' + BACK)
     )
-    facts = {**workplace.FACTS}
-    more = {**facts["FlowActions"].actions, "count": ObjectAction("count", returns=["integer"])}
-    facts["FlowActions"] = TypeFacts("object_types.flow_actions", "Program flow", more)
+    facts = facts_with_count()
     project = from_script(source, workplace.scene(), workplace.project(), facts)
     assert len([step for step in steps_of(project) if step[0] == "count"]) == 401

@@ -1,10 +1,7 @@
 """Built packages run in a real cell host: long ones, and those with a handwritten script."""
 
 import itertools
-import os
 import re
-import subprocess
-import sys
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -22,7 +19,7 @@ from arcor2_server.build.service import files_of
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.functions import make_function
 from tests.server.build import hub, workplace
-from tests.server.build.conftest import make_code
+from tests.server.build.conftest import Mypy, make_code
 from tests.server.build.projects import TypesOfTests
 from tests.server.cell.conftest import Recorder, Server, serving
 
@@ -222,9 +219,7 @@ async def test_a_handwritten_script_is_checked_before_a_build(tmp_path: Path) ->
         await build(tmp_path, handwritten_project(), "a = 1\n\nb = (\n")
 
 
-async def test_a_type_checker_finds_the_errors_of_a_handwritten_script(
-    tmp_path: Path, pytestconfig: pytest.Config
-) -> None:
+async def test_a_type_checker_finds_the_errors_of_a_handwritten_script(tmp_path: Path, mypy: Mypy) -> None:
     directory = tmp_path / "package"
     package.write(await build(tmp_path, handwritten_project(), HANDWRITTEN), directory)
     wrong = {
@@ -245,21 +240,8 @@ async def test_a_type_checker_finds_the_errors_of_a_handwritten_script(
     """
     lines = "".join(f"    {line}\n" for line in wrong)
     (directory / "wrong.py").write_text(textwrap.dedent(head).strip() + "\n" + lines)
-    assert pytestconfig.cache is not None
-    done = subprocess.run(
-        [
-            *(sys.executable, "-m", "mypy", "--strict", "--config-file=", "--no-error-summary"),
-            *("--cache-dir", str(pytestconfig.cache.mkdir("mypy_packages")), "--explicit-package-bases"),
-            *("script.py", "action_points.py", "object_types", "wrong.py"),
-        ],
-        cwd=directory,
-        env={**os.environ, "MYPYPATH": f"{directory}:{ROOT}"},
-        capture_output=True,
-        text=True,
-        timeout=110,
-    )
-    found = [line for line in done.stdout.splitlines() if ": error: " in line]
-    assert len(found) == len(wrong), done.stdout + done.stderr
+    found = [line for line in mypy(directory) if ": error: " in line]
+    assert len(found) == len(wrong), found
     for line, text in zip(found, wrong.values(), strict=True):
         assert line.startswith("wrong.py:")
         assert text in line

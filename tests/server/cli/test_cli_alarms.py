@@ -1,13 +1,12 @@
 """`arcor2-hw alarms`: a damaged file is an alarm that is listed, shelved, acknowledged and counted."""
 
-import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from arcor2_server.cli.exit_status import ExitStatus
-from arcor2_server.cli.main import app
+from tests.server.cli.in_process import Ran, run_app, serving
 from tests.server.core.serving import ServerProcess
 
 
@@ -16,17 +15,13 @@ def server(tmp_path: Path) -> Iterator[ServerProcess]:
     data = tmp_path / "data"
     data.mkdir()
     (data / "markers.json").write_text("damaged")
-    process = ServerProcess(data)
-    with asyncio.Runner() as runner:
-        runner.run(process.start())
+    with serving(data) as process:
         yield process
-        runner.run(process.stop())
 
 
 def test_alarm_is_listed_shelved_and_acknowledged(server: ServerProcess, capsys: pytest.CaptureFixture[str]) -> None:
-    def alarms(*arguments: str) -> tuple[int, str, str]:
-        status = app(["alarms", *arguments, "--url", server.url])
-        return status, *capsys.readouterr()
+    def alarms(*arguments: str) -> Ran:
+        return run_app(capsys, "alarms", *arguments, "--url", server.url)
 
     status, listed, _ = alarms("list")
     assert status == ExitStatus.OK

@@ -1,10 +1,9 @@
 """`arcor2-hw calibrate`: from files, and on a running server."""
 
-import asyncio
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import httpx
@@ -19,20 +18,13 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.cli.calibration_files import angles
 from arcor2_server.cli.exit_status import ExitStatus
-from arcor2_server.cli.main import app
 from arcor2_server.cli.serve import _markers
 from benchmarks import rendering
-from tests.server.core.serving import ServerProcess
+from tests.server.cli.in_process import Ran, run_app, serving
 
 LENS = rendering.Lens(600.0, 599.0, 322.0, 237.0, (0.06, -0.1, 0.0005, -0.0004, 0.02), 640, 480)
 PARAMETERS = CameraParameters(600.0, 599.0, 322.0, 237.0, list(LENS.coefficients))
 CAMERA = rendering.looking_at(np.array([0.25, -0.6, 0.5]), np.zeros(3), 0.2)
-
-
-class Ran(NamedTuple):
-    status: int
-    out: str
-    err: str
 
 
 Cli = Callable[..., Ran]
@@ -49,13 +41,7 @@ PLACES = {3: flat(-0.12, -0.02), 17: flat(0.12, -0.05)}
 
 @pytest.fixture
 def calibrate(capsys: pytest.CaptureFixture[str]) -> Cli:
-    def run(*arguments: str | Path) -> Ran:
-        capsys.readouterr()
-        status = app(["calibrate", *map(str, arguments)])
-        out, err = capsys.readouterr()
-        return Ran(status, out, err)
-
-    return run
+    return lambda *arguments: run_app(capsys, "calibrate", *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -202,46 +188,39 @@ def test_markers_are_read_from_a_file_or_from_the_cell(files: Path, tmp_path: Pa
 
 
 def test_calibrations_are_sent_to_and_read_from_a_running_server(files: Path, tmp_path: Path, calibrate: Cli) -> None:
-    with asyncio.Runner() as runner:
-        server = ServerProcess(tmp_path / "data")
-        runner.run(server.start())
-        try:
-            url = ("--url", server.url)
-            ran = calibrate("online", "markers", files / "markers.yaml", *url)
-            assert (ran.status, ran.out.strip()) == (ExitStatus.OK, "Stored 2 markers and 0 boards.")
-            base = server.url.replace("ws", "http", 1)
-            assert [m["marker_id"] for m in httpx.get(f"{base}/api/calibration/markers").json()["markers"]] == [3, 17]
-            by_hand = {"object_id": "obj_1", "object_name": "cam", "pose": {"position": {"x": 0.25}}, "before": {}}
-            stored = httpx.post(f"{base}/api/calibrations", json=by_hand).json()
-            ran = calibrate("online", "records", *url)
-            assert "by_hand" in ran.out
-            assert "250.0 mm" in ran.out
-            assert "There are no calibrations" in calibrate("online", "records", "other", *url).out
-            checked = httpx.put(
-                f"{base}/api/calibrations/{stored['id']}/check", json={"pose": {"position": {"x": 0.26}}}
-            )
-            assert checked.json()["passed"] is False
-            near, far = tmp_path / "near.yaml", tmp_path / "far.yaml"
-            near.write_text("position: {x: 0.2515}")
-            far.write_text("position: {x: 0.26}")
-            ran = calibrate("online", "check", "cam", "--pose", near, *url)
-            assert (ran.status, "cam is still as calibrated" in ran.out, "1.5 mm" in ran.out) == (0, True, True)
-            ran = calibrate("online", "check", "cam", "--pose", far, "--record", stored["id"], *url)
-            assert (ran.status, ran.out) == (ExitStatus.DIFFERENT, "")
-            assert "cam differs by 10.0 mm" in ran.err
-            ran = calibrate("online", "check", "cam", "--pose", far, "--distance", "0.011", *url)
-            assert ran.status == 0
-            for words, status in (
-                (("other", "--pose", near), ExitStatus.NOT_FOUND),
-                (("other", "--pose", near, "--record", stored["id"]), ExitStatus.DOCUMENT_PROBLEMS),
-                (("cam", "--pose", near, "--record", "cal_none"), ExitStatus.NOT_FOUND),
-                (("cam",), ExitStatus.CONFLICT),
-            ):
-                assert calibrate("online", "check", *words, *url).status == status, words
-            ran = calibrate("online", "camera", "cam", *url)
-            assert (ran.status, ran.out) == (ExitStatus.CONFLICT, "")
-            assert "No scene is open" in ran.err
-        finally:
-            runner.run(server.stop())
+    with serving(tmp_path / "data") as server:
+        url = ("--url", server.url)
+        ran = calibrate("online", "markers", files / "markers.yaml", *url)
+        assert (ran.status, ran.out.strip()) == (ExitStatus.OK, "Stored 2 markers and 0 boards.")
+        base = server.url.replace("ws", "http", 1)
+        assert [m["marker_id"] for m in httpx.get(f"{base}/api/calibration/markers").json()["markers"]] == [3, 17]
+        by_hand = {"object_id": "obj_1", "object_name": "cam", "pose": {"position": {"x": 0.25}}, "before": {}}
+        stored = httpx.post(f"{base}/api/calibrations", json=by_hand).json()
+        ran = calibrate("online", "records", *url)
+        assert "by_hand" in ran.out
+        assert "250.0 mm" in ran.out
+        assert "There are no calibrations" in calibrate("online", "records", "other", *url).out
+        checked = httpx.put(f"{base}/api/calibrations/{stored['id']}/check", json={"pose": {"position": {"x": 0.26}}})
+        assert checked.json()["passed"] is False
+        near, far = tmp_path / "near.yaml", tmp_path / "far.yaml"
+        near.write_text("position: {x: 0.2515}")
+        far.write_text("position: {x: 0.26}")
+        ran = calibrate("online", "check", "cam", "--pose", near, *url)
+        assert (ran.status, "cam is still as calibrated" in ran.out, "1.5 mm" in ran.out) == (0, True, True)
+        ran = calibrate("online", "check", "cam", "--pose", far, "--record", stored["id"], *url)
+        assert (ran.status, ran.out) == (ExitStatus.DIFFERENT, "")
+        assert "cam differs by 10.0 mm" in ran.err
+        ran = calibrate("online", "check", "cam", "--pose", far, "--distance", "0.011", *url)
+        assert ran.status == 0
+        for words, status in (
+            (("other", "--pose", near), ExitStatus.NOT_FOUND),
+            (("other", "--pose", near, "--record", stored["id"]), ExitStatus.DOCUMENT_PROBLEMS),
+            (("cam", "--pose", near, "--record", "cal_none"), ExitStatus.NOT_FOUND),
+            (("cam",), ExitStatus.CONFLICT),
+        ):
+            assert calibrate("online", "check", *words, *url).status == status, words
+        ran = calibrate("online", "camera", "cam", *url)
+        assert (ran.status, ran.out) == (ExitStatus.CONFLICT, "")
+        assert "No scene is open" in ran.err
     ran = calibrate("online", "records", "--url", "ws://127.0.0.1:9")
     assert ran.status == ExitStatus.NO_SERVER

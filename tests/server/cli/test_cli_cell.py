@@ -1,31 +1,28 @@
 """`arcor2-hw cell`: mode, authority and jobs of a running server."""
 
-import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from arcor2_server.cli.exit_status import ExitStatus
-from arcor2_server.cli.main import app
+from tests.server.cli.in_process import run_app, serving
 from tests.server.core.serving import ServerProcess
 
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[ServerProcess]:
-    process = ServerProcess(tmp_path / "data", "--plc-modbus", "127.0.0.1:0")
-    with asyncio.Runner() as runner:
-        runner.run(process.start())
+    with serving(tmp_path / "data", "--plc-modbus", "127.0.0.1:0") as process:
         yield process
-        runner.run(process.stop())
 
 
 def test_mode_authority_and_jobs_are_shown_and_changed(
     server: ServerProcess, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def cell(*arguments: str) -> str:
-        assert app(["cell", *arguments, "--url", server.url]) == ExitStatus.OK
-        return str(capsys.readouterr().out)
+        ran = run_app(capsys, "cell", *arguments, "--url", server.url)
+        assert ran.status == ExitStatus.OK, ran.err
+        return ran.out
 
     assert "state stopped, mode produce, authority hub" in cell("show")
     assert "mode changeover" in cell("mode", "changeover")
@@ -38,5 +35,5 @@ def test_mode_authority_and_jobs_are_shown_and_changed(
 
 
 def test_an_address_without_a_port_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert app(["serve", "--plc-modbus", "127.0.0.1"]) == ExitStatus.USAGE
-    assert "--plc-modbus" in capsys.readouterr().err
+    ran = run_app(capsys, "serve", "--plc-modbus", "127.0.0.1")
+    assert (ran.status, "--plc-modbus" in ran.err) == (ExitStatus.USAGE, True)

@@ -23,6 +23,7 @@ from arcor2_server.access.tokens import TokenFile
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.main import app
 from tests.runtime.older_sources import SOURCES
+from tests.server.cli.in_process import Ran, run_app
 from tests.server.core.serving import ServerProcess
 
 CRATE = '''"""A crate with a mesh."""
@@ -44,12 +45,6 @@ class Crate(CollisionObject):
 '''
 MESH = b"solid crate" + bytes(range(256)) * 400
 SCRIPT = "def main() -> None:\n    print('by hand')\n"
-
-
-class Ran(NamedTuple):
-    status: int
-    out: str
-    err: str
 
 
 class Servers(NamedTuple):
@@ -153,11 +148,9 @@ def cli(servers: Servers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
     monkeypatch.delenv("ARCOR2_HW_TOKEN", raising=False)
 
     def run(*words: str, at: str = "") -> Ran:
-        capsys.readouterr()
-        status = app([*words, "--url", at] if at else list(words))
-        printed = capsys.readouterr()
-        assert status == 0 or printed.err.startswith(f"arcor2-hw {words[0]} {words[1]}: "), printed.err
-        return Ran(status, printed.out, printed.err)
+        ran = run_app(capsys, *words, *(("--url", at) if at else ()))
+        assert ran.status == 0 or ran.err.startswith(f"arcor2-hw {words[0]} {words[1]}: "), ran.err
+        return ran
 
     return run
 

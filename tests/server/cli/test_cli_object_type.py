@@ -3,24 +3,16 @@
 import asyncio
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
 from arcor2_hw.analysis import module_name
 from arcor2_hw.client import Client
 from arcor2_server.cli.exit_status import ExitStatus
-from arcor2_server.cli.main import app
 from arcor2_server.exchange.import_ import HIDES_INSTALLED
 from tests.runtime.older_sources import SOURCES
+from tests.server.cli.in_process import Ran, run_app, serving
 from tests.server.core.serving import ServerProcess
-
-
-class Ran(NamedTuple):
-    returncode: int
-    stdout: str
-    stderr: str
-
 
 Cli = Callable[..., Ran]
 
@@ -31,25 +23,15 @@ def object_type(capsys: pytest.CaptureFixture[str]) -> Cli:
 
     def run(server: ServerProcess | None, *arguments: str | Path) -> Ran:
         url = "ws://127.0.0.1:9" if server is None else server.url
-        capsys.readouterr()
-        status = app(["object-type", *map(str, arguments), "--url", url])
-        return Ran(status, *capsys.readouterr())
+        return run_app(capsys, "object-type", *arguments, "--url", url)
 
     return run
 
 
 @pytest.fixture
-def loop() -> Iterator[asyncio.Runner]:
-    with asyncio.Runner() as runner:
-        yield runner
-
-
-@pytest.fixture
-def server(loop: asyncio.Runner, tmp_path: Path) -> Iterator[ServerProcess]:
-    process = ServerProcess(tmp_path / "data")
-    loop.run(process.start())
-    yield process
-    loop.run(process.stop())
+def server(tmp_path: Path) -> Iterator[ServerProcess]:
+    with serving(tmp_path / "data") as process:
+        yield process
 
 
 async def types(url: str) -> dict[str, tuple[bool, str]]:
@@ -65,48 +47,48 @@ def sources(tmp_path: Path) -> Path:
 
 
 def test_related_types_are_uploaded_together_and_separately(
-    sources: Path, server: ServerProcess, loop: asyncio.Runner, object_type: Cli
+    sources: Path, server: ServerProcess, object_type: Cli
 ) -> None:
     arm, base, mixin = (sources / f"{name}.py" for name in ("arm_m1", "abstract_arm", "kinematics_mixin"))
     helper = sources / "gains.py"
     helper.write_text("SLOW = 0.1\n")
     arm.write_text(f"{arm.read_text()}\n\nfrom .gains import SLOW\n")
-    assert object_type(server, "add", helper).stdout == "gains uploaded\n"
+    assert object_type(server, "add", helper).out == "gains uploaded\n"
     incomplete = object_type(server, "add", arm)
-    assert incomplete.returncode == ExitStatus.ANALYSIS_PROBLEMS
-    assert "arm_m1.py:3: the imported module abstract_arm does not exist" in incomplete.stderr
+    assert incomplete.status == ExitStatus.ANALYSIS_PROBLEMS
+    assert "arm_m1.py:3: the imported module abstract_arm does not exist" in incomplete.err
     together = object_type(server, "add", arm, base, mixin)
-    assert (together.returncode, together.stderr) == (0, "")
-    assert together.stdout == "AbstractArm uploaded\nArmM1 uploaded with kinematics_mixin\n"
-    assert object_type(server, "add", helper).stdout == "gains uploaded, used by ArmM1\n"
-    known = loop.run(types(server.url))
+    assert (together.status, together.err) == (0, "")
+    assert together.out == "AbstractArm uploaded\nArmM1 uploaded with kinematics_mixin\n"
+    assert object_type(server, "add", helper).out == "gains uploaded, used by ArmM1\n"
+    known = asyncio.run(types(server.url))
     assert known["ArmM1"] == (False, "AbstractArm")
     assert "gains" not in known
     # Its dependencies are uploaded already.
     arm.write_text(arm.read_text().replace("arm-m1.zip", "arm-m2.zip"))
-    assert object_type(server, "add", arm).returncode == 0
-    listed = object_type(server, "list").stdout
+    assert object_type(server, "add", arm).status == 0
+    listed = object_type(server, "list").out
     assert all(name in listed for name in ("AbstractArm", "ArmM1", "gains"))
-    assert object_type(server, "remove", "gains").returncode == 0
-    assert object_type(server, "remove", "gains").returncode == ExitStatus.NOT_FOUND
+    assert object_type(server, "remove", "gains").status == 0
+    assert object_type(server, "remove", "gains").status == ExitStatus.NOT_FOUND
     again = object_type(server, "add", arm)
-    assert again.returncode == ExitStatus.ANALYSIS_PROBLEMS
-    assert "gains" in again.stderr
+    assert again.status == ExitStatus.ANALYSIS_PROBLEMS
+    assert "gains" in again.err
     # The name of an installed type: a notice says so, and how to undo it.
     flow = sources / "flow_actions.py"
     flow.write_text(
         "from arcor2_hw.objects import Generic\n\n\n"
         'class FlowActions(Generic):\n    _ABSTRACT = False\n    display_name = "Own flow"\n'
     )
-    notice = object_type(server, "add", flow).stdout
+    notice = object_type(server, "add", flow).out
     assert "FlowActions replaces the installed type of arcor2-hw" in notice
     assert "until you remove it" in notice
-    assert "Own flow" in object_type(server, "list").stdout
+    assert "Own flow" in object_type(server, "list").out
     exported = sources / "flow.zip"
-    assert object_type(server, "export", "FlowActions", "--output", exported).returncode == 0
-    assert object_type(server, "remove", "FlowActions").returncode == 0
+    assert object_type(server, "export", "FlowActions", "--output", exported).status == 0
+    assert object_type(server, "remove", "FlowActions").status == 0
     imported = object_type(server, "import", exported)
-    assert imported.stdout == f"object type FlowActions: new, {HIDES_INSTALLED}\n", imported.stderr
+    assert imported.out == f"object type FlowActions: new, {HIDES_INSTALLED}\n", imported.err
 
 
 def test_invalid_types_are_refused(sources: Path, object_type: Cli) -> None:
@@ -128,4 +110,4 @@ def test_invalid_types_are_refused(sources: Path, object_type: Cli) -> None:
     )
     for arguments, status, words in cases:
         done = object_type(None, "add", *arguments)
-        assert (done.returncode, words in done.stderr) == (status, True), done.stderr
+        assert (done.status, words in done.err) == (status, True), done.err

@@ -16,7 +16,7 @@ from arcor2_hw.data.role import Role
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.fleet.file import FILE, FleetFile
 from arcor2_server.fleet.registry import StoredCell
-from tests.server.fleet.broker import free_port
+from tests.ports import free_port
 from tests.server.fleet.cells import state_of
 from tests.server.fleet.test_results import FleetProcess
 from tests.waiting import WITHIN

@@ -6,10 +6,8 @@ import subprocess
 from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 
-import nats
 import pytest
 from msgspec.structs import replace
-from nats.aio.client import Client
 from nats.aio.msg import Msg
 
 from arcor2_hw.exceptions import Conflict
@@ -22,10 +20,11 @@ from arcor2_server.nodes.credentials import Credentials, MemberKind, load
 from arcor2_server.nodes.nkeys import Kind, SigningKey
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
-from tests.server.fleet.broker import free_port, listens
+from tests.ports import free_port
+from tests.server.fleet.broker import listens
 from tests.server.fleet.cells import unit
 from tests.server.fleet.test_results import CELL, FleetProcess, SmallCell, until
-from tests.server.nodes.conftest import NATS_SERVER, paired_by_commands
+from tests.server.nodes.conftest import NATS_SERVER, Connected, paired_by_commands
 from tests.waiting import WITHIN, wait_for
 
 pytestmark = pytest.mark.xdist_group("fleet")
@@ -86,28 +85,6 @@ def hub(tmp_path: Path) -> Iterator[Hub]:
     running.start()
     yield running
     running.end()
-
-
-class Connected:
-    """A user of the broker, with the errors that it gets."""
-
-    def __init__(self) -> None:
-        self.errors: list[str] = []
-        self.closed = asyncio.Event()
-        self.client: Client
-
-    async def connect(self, credentials: Credentials, answers: str = "_INBOX") -> "Connected":
-        async def failed(error: Exception) -> None:
-            self.errors.append(str(error))
-
-        async def ended() -> None:
-            self.closed.set()
-
-        self.client = await nats.connect(
-            credentials.url, allow_reconnect=False, error_cb=failed, closed_cb=ended, inbox_prefix=answers,
-            **credentials.options(),
-        )  # fmt: skip
-        return self
 
 
 @contextlib.asynccontextmanager

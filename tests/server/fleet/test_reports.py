@@ -23,7 +23,7 @@ from arcor2_server.fleet.driver_texts import DriverTexts, texts_of
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
 from arcor2_server.fleet.reports import FleetReports, Period
 from arcor2_server.fleet.summaries import UnitSummary, of_alarm, of_unit
-from tests.server.fleet.broker import free_port
+from tests.ports import free_port
 from tests.server.fleet.cells import unit
 from tests.server.fleet.test_results import FleetProcess
 

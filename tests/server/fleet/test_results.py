@@ -24,7 +24,8 @@ from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.storage.outbox import OutboxKind, UnitOutbox
 from arcor2_server.storage.units import UnitStore
-from tests.server.fleet.broker import Link, Server, free_port
+from tests.ports import free_port
+from tests.server.fleet.broker import Link, Server
 from tests.server.fleet.cells import ENTERED, state_of, unit
 from tests.waiting import WITHIN
 

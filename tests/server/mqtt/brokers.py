@@ -6,13 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.ports import free_port
 from tests.waiting import wait_for
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def _command(name: str) -> str:

@@ -12,7 +12,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import nats
 import pytest
+from nats.aio.client import Client
 
 from arcor2_hw.data.cell import BROKER_CREDENTIALS
 from arcor2_hw.data.nodes import NodeState
@@ -22,6 +24,7 @@ from arcor2_server.access.authority import Authority
 from arcor2_server.hosts.process import CellHost
 from arcor2_server.nodes.accounts import Accounts
 from arcor2_server.nodes.board import NodeBoard
+from arcor2_server.nodes.credentials import Credentials
 from arcor2_server.settings import ServerSettings
 from tests.waiting import wait_for
 
@@ -173,20 +176,20 @@ async def followed(environment: Mapping[str, str]) -> AsyncIterator[Callable[...
 
 
 class Listener:
-    """Stores the reports of a host."""
+    """Stores the reports of a host, or of a group of hosts."""
 
     def __init__(self) -> None:
         self.messages: list[m.ServerBound] = []
         self.reasons: list[str] = []
         self.ended_at = 0.0
 
-    def host_message(self, host: CellHost, message: m.ServerBound) -> None:
+    def host_message(self, host: object, message: m.ServerBound) -> None:
         self.messages.append(message)
 
-    def host_silent(self, host: CellHost, silent: bool) -> None:
+    def host_silent(self, host: object, silent: bool) -> None:
         """Ignore silence, which a busy machine causes now and then."""
 
-    def host_ended(self, host: CellHost, reason: Message) -> None:
+    def host_ended(self, host: object, reason: Message) -> None:
         self.reasons.append(reason.text)
         self.ended_at = asyncio.get_running_loop().time()
 
@@ -210,3 +213,25 @@ async def start_host(broker: Broker) -> AsyncIterator[Callable[..., Any]]:
     yield start
     for host in hosts:
         await host.close()
+
+
+class Connected:
+    """A client of a NATS broker that stores the errors which the broker sends."""
+
+    def __init__(self) -> None:
+        self.errors: list[str] = []
+        self.closed = asyncio.Event()
+        self.client: Client
+
+    async def connect(self, credentials: Credentials, answers: str = "_INBOX") -> "Connected":
+        async def failed(error: Exception) -> None:
+            self.errors.append(str(error))
+
+        async def ended() -> None:
+            self.closed.set()
+
+        self.client = await nats.connect(
+            credentials.url, allow_reconnect=False, error_cb=failed, closed_cb=ended, inbox_prefix=answers,
+            **credentials.options(),
+        )  # fmt: skip
+        return self

@@ -10,9 +10,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import nats
 import pytest
-from nats.aio.client import Client
 from nats.aio.msg import Msg
 
 from arcor2_hw.data.cell import BROKER_URL
@@ -29,7 +27,7 @@ from arcor2_server.nodes.credentials import Credentials, load, node_file, requir
 from arcor2_server.nodes.nkeys import Kind, SigningKey, is_user_key
 from arcor2_server.nodes.presence import own_version
 from arcor2_server.settings import ServerSettings
-from tests.server.nodes.conftest import CLI, NODE, PATIENCE, Node, Server, followed, paired_by_commands
+from tests.server.nodes.conftest import CLI, NODE, PATIENCE, Connected, Node, Server, followed, paired_by_commands
 from tests.server.nodes.test_node_hosts import moving, online
 from tests.waiting import wait_for
 
@@ -115,29 +113,6 @@ def test_accepted_nodes_are_listed(server: Server, capsys: pytest.CaptureFixture
 
 
 # ---------------------------------------------------------------------------------------------------- rights
-class Connected:
-    """A user of the broker, with the errors that it gets."""
-
-    def __init__(self, client: Client, errors: list[str], closed: asyncio.Event) -> None:
-        self.client, self.errors, self.closed = client, errors, closed
-
-
-async def connected(credentials: Credentials) -> Connected:
-    errors: list[str] = []
-    closed = asyncio.Event()
-
-    async def failed(error: Exception) -> None:
-        errors.append(str(error))
-
-    async def ended() -> None:
-        closed.set()
-
-    client = await nats.connect(
-        credentials.url, allow_reconnect=False, error_cb=failed, closed_cb=ended, **credentials.options()
-    )
-    return Connected(client, errors, closed)
-
-
 def accepted(server: Server, name: str) -> Credentials:
     key = SigningKey.create(Kind.USER)
     found = server.accounts.accept(name, key.public, "127.0.0.1")
@@ -151,8 +126,8 @@ FORBIDDEN = (
 
 
 async def test_a_node_reaches_only_its_own_subjects(server: Server) -> None:
-    press, oven = await connected(accepted(server, NODE)), await connected(accepted(server, "oven"))
-    hub = await connected(load(server.settings.broker_credentials))
+    press, oven = await Connected().connect(accepted(server, NODE)), await Connected().connect(accepted(server, "oven"))
+    hub = await Connected().connect(load(server.settings.broker_credentials))
     received: list[str] = []
 
     async def receive(message: Msg) -> None:
@@ -193,7 +168,7 @@ async def test_a_node_reaches_only_its_own_subjects(server: Server) -> None:
 
 async def test_only_the_revoked_node_is_cut_and_stays_out(server: Server) -> None:
     lost, other = accepted(server, NODE), accepted(server, "oven")
-    press, oven = await connected(lost), await connected(other)
+    press, oven = await Connected().connect(lost), await Connected().connect(other)
     await server.accounts.revoke(NODE)
     async with asyncio.timeout(CUT_WITHIN):
         await press.closed.wait()
@@ -203,7 +178,7 @@ async def test_only_the_revoked_node_is_cut_and_stays_out(server: Server) -> Non
     for credentials in (lost, Credentials(lost.url)):
         with pytest.raises(ConnectionLost, match="refuses the credentials"):
             await connect_client(credentials, "test")
-    again = [await connected(each) for each in (other, accepted(server, NODE))]
+    again = [await Connected().connect(each) for each in (other, accepted(server, NODE))]
     for each in again:
         await each.client.close()
 

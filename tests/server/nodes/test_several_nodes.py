@@ -17,7 +17,6 @@ from arcor2_hw.data.interlocks import Interlock, InterlockCondition, InterlockTa
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, SeveralNodes
-from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.ring import Ring
 from arcor2_server.hosts.group import HostGroup
@@ -26,7 +25,7 @@ from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.process import CellError
 from tests.runtime.conftest import Package, open_scene, scene_object, type_code
 from tests.runtime.test_host_program import ARM
-from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Node
+from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Listener, Node
 from tests.waiting import wait_for
 
 pytestmark = pytest.mark.xdist_group("nodes")  # its tests share a broker and nodes
@@ -129,21 +128,8 @@ def derives(name: str, base: str) -> bool:
     return (name, base) in (("Arm", "Robot"), ("Box", "VirtualCollisionObject"))
 
 
-class Listener:
-    """Stores what a group reports."""
-
-    def __init__(self) -> None:
-        self.messages: list[m.ServerBound] = []
-        self.reasons: list[str] = []
-
-    def host_message(self, host: HostGroup, message: m.ServerBound) -> None:
-        self.messages.append(message)
-
-    def host_silent(self, host: HostGroup, silent: bool) -> None:
-        """Busy machines are silent now and then."""
-
-    def host_ended(self, host: HostGroup, reason: Message) -> None:
-        self.reasons.append(reason.text)
+class GroupListener(Listener):
+    """Stores the reports of a group of hosts."""
 
     async def until(self, kind: type[Any], where: Callable[[Any], bool] = lambda _: True) -> Any:
         def found() -> list[Any]:
@@ -156,7 +142,7 @@ class Cell:
     """A pool of hosts, and the objects of a scene: an arm on this computer, readers on two nodes."""
 
     def __init__(self, pool: CellHosts, folder: Path) -> None:
-        self.pool, self.folder, self.listener = pool, folder, Listener()
+        self.pool, self.folder, self.listener = pool, folder, GroupListener()
         self.file = folder / "notes"
         self.file.touch()
         self.objects = [
@@ -456,7 +442,7 @@ class HostStub:
 
 async def test_a_call_that_crosses_a_stop_is_not_executed() -> None:
     hosts = HostStub(""), HostStub(NODE)
-    listener: Any = Listener()
+    listener: Any = GroupListener()
     placement = place(None, [SceneObject("arm", "Arm", id="arm"), *objects_on(reader=NODE)], derives)
     group = HostGroup(listener, placement, hosts, lambda _: None)  # type: ignore[arg-type]
     main, other = hosts

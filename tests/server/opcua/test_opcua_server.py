@@ -21,6 +21,7 @@ from asyncua.crypto.validator import CertificateValidator, CertificateValidatorO
 from arcor2_hw.data.role import Role
 from arcor2_server.access.tokens import TokenFile
 from tests.fakes.conftest import FakeProcess
+from tests.ports import free_port
 from tests.runtime.conftest import Package, scene_object
 from tests.server.cell.test_execution import LAMP, OBJ, PROJECT
 from tests.server.core.serving import RawConnection, ServerProcess, running, talking
@@ -69,12 +70,6 @@ class Plant:
         """Return the id of the newest process of the OPC UA server."""
         lines = [json.loads(line) for line in self.server.log.read_text().splitlines() if line.startswith("{")]
         return [each["pid"] for each in lines if each["event"] == "OPC UA server starts"][-1]
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

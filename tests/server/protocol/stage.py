@@ -149,6 +149,22 @@ class Stage:
         self.ids |= {obj.name: obj.id for obj in scene.objects}
         person.take()
 
+    async def add(self, person: Actor, name: str, kind: str, pose: Pose, **settings: str | float) -> str:
+        """Add an object to the open scene, store its id in `ids`, and return the id."""
+        parameters = [
+            {
+                "name": key,
+                "type": "string" if isinstance(value, str) else "double",
+                "value": msgspec.json.encode(value).decode(),
+            }
+            for key, value in settings.items()
+        ]
+        await person.ask(
+            "AddObjectToScene", name=name, type=kind, pose=msgspec.to_builtins(pose), parameters=parameters
+        )
+        self.ids |= {obj.name: obj.id for obj in self.services.session.require_scene().objects}
+        return self.ids[name]
+
     async def start(self, person: Actor) -> None:
         await person.ask("StartScene")
         await until_event(person, "SceneState", state="started")

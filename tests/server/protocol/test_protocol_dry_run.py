@@ -8,7 +8,7 @@ import msgspec
 
 from arcor2_hw.data.geometry import Pose
 from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until
-from tests.server.protocol.test_protocol_reachability import add, move, point
+from tests.server.protocol.test_protocol_reachability import move, point
 
 
 async def action(
@@ -53,7 +53,7 @@ async def test_a_dry_run_predicts_the_open_project_until_it_is_edited(tmp_path: 
         assert "no such dry run" in await refused(alice, "GetDryRun")
         assert "No dry run is running" in await refused(alice, "CancelDryRun")
         await alice.ask("NewScene", name="scene")
-        robot = await add(alice, stage, "ur", "UR5e", Pose(), host="127.0.0.99")
+        robot = await stage.add(alice, "ur", "UR5e", Pose(), host="127.0.0.99")
         await alice.ask("SaveScene")
         await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
         assert "no first action" in await refused(alice, "StartDryRun")

@@ -33,7 +33,7 @@ async def stage(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stage
         await opened.services.types.add(ObjectTypeSource("Crate", CRATE.lstrip(), model=crate))
         alice = await opened.person("alice")
         await opened.place(alice, arm="Arm", dumb="DumbArm", two="TwoArms")
-        await add(alice, opened, "ur", "UR5e", BASE, host="127.0.0.99")
+        await opened.add(alice, "ur", "UR5e", BASE, host="127.0.0.99")
         await solve(alice, opened.ids["ur"])  # starts the worker
         await opened.spare_host()  # now, so that the start does not count as part of some test
         opened.alice = alice  # type: ignore[attr-defined]
@@ -44,20 +44,6 @@ async def stage(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stage
 def alice(stage: Stage) -> Actor:
     actor: Actor = stage.alice  # type: ignore[attr-defined]
     return actor
-
-
-async def add(person: Actor, stage: Stage, name: str, kind: str, pose: Pose, **settings: Any) -> str:
-    parameters = [
-        {
-            "name": key,
-            "type": "string" if isinstance(value, str) else "double",
-            "value": msgspec.json.encode(value).decode(),
-        }
-        for key, value in settings.items()
-    ]
-    await person.ask("AddObjectToScene", name=name, type=kind, pose=msgspec.to_builtins(pose), parameters=parameters)
-    stage.ids |= {obj.name: obj.id for obj in stage.services.session.require_scene().objects}
-    return stage.ids[name]
 
 
 async def solve(alice: Actor, robot: str, pose: Pose = TARGET, **more: Any) -> list[dict[str, Any]]:
@@ -85,7 +71,7 @@ async def test_joints_are_computed_from_the_model_offline(stage: Stage, alice: A
 
 async def test_scene_objects_are_obstacles_for_inverse_kinematics(stage: Stage, alice: Actor) -> None:
     robot = stage.ids["ur"]
-    crate = await add(alice, stage, "crate", "Crate", Pose(TARGET.position))
+    crate = await stage.add(alice, "crate", "Crate", Pose(TARGET.position))
     args = {"robot_id": robot, "end_effector_id": "tcp", "pose": msgspec.to_builtins(TARGET)}
     text = await refused(alice, "InverseKinematics", **args)
     assert "only in collision" in text
@@ -121,7 +107,7 @@ async def test_impossible_requests_are_refused(stage: Stage, alice: Actor) -> No
 async def test_object_settings_change_its_model(stage: Stage, alice: Actor) -> None:
     short = await forward(alice, stage.ids["ur"], await solve(alice, stage.ids["ur"]))
     joints = await solve(alice, stage.ids["ur"])
-    longer = await add(alice, stage, "longer", "UR5e", BASE, host="127.0.0.98", tcp_z=0.1)
+    longer = await stage.add(alice, "longer", "UR5e", BASE, host="127.0.0.98", tcp_z=0.1)
     reached = await forward(alice, longer, joints)
     assert reached.position.distance_to(short.position) == pytest.approx(0.1, abs=1e-6)
     await alice.ask("RemoveFromScene", id=longer)
@@ -137,7 +123,7 @@ async def test_kinematics_are_computed_for_a_robot_without_its_own(stage: Stage,
     meta = stage.services.types.robot_meta("Silent")
     assert not meta.features.inverse_kinematics
     assert not meta.features.forward_kinematics
-    robot = await add(alice, stage, "silent", "Silent", BASE)
+    robot = await stage.add(alice, "silent", "Silent", BASE)
     joints = await solve(alice, stage.ids["ur"])
     for name in ("ur", "arm", "two"):
         await alice.ask("RemoveFromScene", id=stage.ids[name])

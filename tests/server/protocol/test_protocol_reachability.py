@@ -6,8 +6,6 @@ import signal
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from arcor2_hw.collision.description import Obstacle
 from arcor2_hw.compute.kinematics_tasks import DescribeRobot
 from arcor2_hw.compute.task import WorkerKind
@@ -22,15 +20,6 @@ from tests.server.protocol.stage import PATIENCE, Actor, Stage, open_stage, refu
 
 DOWN = {"x": 1, "y": 0, "z": 0, "w": 0}
 CRATE = PART.replace("class Part", "class Crate")
-
-
-async def add(person: Actor, stage: Stage, name: str, kind: str, pose: Pose, **settings: str) -> str:
-    parameters = [
-        {"name": key, "type": "string", "value": msgspec.json.encode(value).decode()} for key, value in settings.items()
-    ]
-    await person.ask("AddObjectToScene", name=name, type=kind, pose=msgspec.to_builtins(pose), parameters=parameters)
-    stage.ids |= {obj.name: obj.id for obj in stage.services.session.require_scene().objects}
-    return stage.ids[name]
 
 
 async def point(person: Actor, stage: Stage, name: str, x: float, y: float, z: float) -> tuple[str, str]:
@@ -63,8 +52,8 @@ async def prepared(stage: Stage, alice: Actor) -> str:
     crate = ObjectModel.of(Box("Crate", 0.2, 0.2, 0.2))
     await stage.services.types.add(ObjectTypeSource("Crate", CRATE.lstrip(), model=crate))
     await alice.ask("NewScene", name="scene")
-    robot = await add(alice, stage, "ur", "UR5e", Pose(), host="127.0.0.99")
-    await add(alice, stage, "crate", "Crate", Pose(Position(0, 5, 0)))
+    robot = await stage.add(alice, "ur", "UR5e", Pose(), host="127.0.0.99")
+    await stage.add(alice, "crate", "Crate", Pose(Position(0, 5, 0)))
     await alice.ask("SaveScene")
     await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
     return robot
@@ -176,8 +165,8 @@ async def test_two_arms_are_obstacles_for_each_other(tmp_path: Path) -> None:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         await stage.services.types.add(ObjectTypeSource("JointArm", JOINT_ARM.lstrip()))
         await alice.ask("NewScene", name="scene")
-        await add(alice, stage, "arm", "JointArm", Pose())
-        other = await add(alice, stage, "other", "JointArm", Pose(Position(0, 1, 0)))
+        await stage.add(alice, "arm", "JointArm", Pose())
+        other = await stage.add(alice, "other", "JointArm", Pose(Position(0, 1, 0)))
         await alice.ask("SaveScene")
         await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
         _, between = await point(alice, stage, "between", 0.134, 0.492, 0.488)
@@ -241,8 +230,8 @@ async def test_a_gripped_part_is_an_obstacle_online(tmp_path: Path) -> None:
         for kind, source, model in (("JointArm", JOINT_ARM, UNSET), ("Claw", CLAW, UNSET), ("Crate", CRATE, crate)):
             await stage.services.types.add(ObjectTypeSource(kind, source.lstrip(), model=model))
         await alice.ask("NewScene", name="scene")
-        robot = await add(alice, stage, "arm", "JointArm", Pose())
-        await add(alice, stage, "crate", "Crate", Pose(Position(0.134, 0.492, 0.238)))
+        robot = await stage.add(alice, "arm", "JointArm", Pose())
+        await stage.add(alice, "crate", "Crate", Pose(Position(0.134, 0.492, 0.238)))
         await alice.ask("AddObjectToScene", name="claw", type="Claw", parameters=[])
         stage.ids |= {obj.name: obj.id for obj in stage.services.session.require_scene().objects}
         await alice.ask("SaveScene")
@@ -307,7 +296,7 @@ async def test_a_damaged_robot_model_is_reported(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm") as stage:
         alice = await stage.person("alice")
         await alice.ask("NewScene", name="scene")
-        await add(alice, stage, "arm", "Arm", Pose())
+        await stage.add(alice, "arm", "Arm", Pose())
         await alice.ask("SaveScene")
         await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
         await point(alice, stage, "near", 0.4, 0.2, 0.3)

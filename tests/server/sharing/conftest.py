@@ -1,13 +1,11 @@
-"""A server for each test, and helpers that wait for events."""
+"""A server and its users for each test, and helpers that wait for events."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
-import pytest
-
-from tests.server.session.session_server import Person, SessionServer, open_server
+from tests.server.session.conftest import alice, bob, server, stranger  # noqa: F401 - fixtures
+from tests.server.session.session_server import Person
 
 PATIENCE = 40.0
 
@@ -29,28 +27,3 @@ async def subscribed(person: Person, *names: str, **more: Any) -> Person:
     await person.ask("SubscribeEvents", events=list(names), **more)
     person.take()
     return person
-
-
-@pytest.fixture
-async def server(tmp_path: Path) -> AsyncIterator[SessionServer]:
-    """Start a server without a socket."""
-    async with open_server(tmp_path) as opened:
-        yield opened
-
-
-@pytest.fixture
-async def alice(server: SessionServer) -> Person:
-    """Connect a registered user."""
-    return await server.person("alice")
-
-
-@pytest.fixture
-async def bob(server: SessionServer) -> Person:
-    """Connect another registered user."""
-    return await server.person("bob")
-
-
-@pytest.fixture
-async def stranger(server: SessionServer) -> Person:
-    """Connect a client without a registered user."""
-    return await server.person()
