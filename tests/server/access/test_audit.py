@@ -102,10 +102,10 @@ async def test_a_cancelled_request_leaves_its_changes_in_the_trail(tmp_path: Pat
     await started.wait()
     handling.cancel()
     await asyncio.wait({handling})
-    noted = audit._waiting.get_nowait()
-    assert noted is not None
-    assert (noted.request, noted.outcome.value, noted.reason) == ("SaveScene", "refused", ENDED_EARLY)
-    assert [change.after for change in noted.changes] == ["new"]
+    entry = audit._waiting.get_nowait()
+    assert entry is not None
+    assert (entry.request, entry.outcome.value, entry.reason) == ("SaveScene", "refused", ENDED_EARLY)
+    assert [change.after for change in entry.changes] == ["new"]
 
 
 def test_requests_excluded_from_the_audit_trail_exist() -> None:

@@ -50,9 +50,9 @@ def reformatted(source: str, rng: random.Random) -> str:
             continue
         comments = rng.random() < 0.4 and not text.startswith("#")
         number += 1
-        what = name[1] if name else f"line {number}"
+        label = name[1] if name else f"line {number}"
         if comments:
-            lines += [""] * rng.randrange(3) + [f"{indent}#   above {what}:"]
+            lines += [""] * rng.randrange(3) + [f"{indent}#   above {label}:"]
             lines += [f"{indent}#{quote}" for quote in rng.sample(["", ' "quoted', "  if x:"], rng.randrange(2))]
         if inside:
             text = re.sub(r"(if|elif) (\w+) == True:", r"\1 \2:", text) if rng.random() < 0.3 else text
@@ -64,7 +64,7 @@ def reformatted(source: str, rng: random.Random) -> str:
             first, rest = text.split("(", 1)
             text = f"{first}(\n{indent}      {rest[:-1]}\n{indent})"
         if comments and rng.random() < 0.5 and not text.endswith('"'):
-            text += f"  # behind {what}"
+            text += f"  # behind {label}"
         lines += f"{indent}{text}".split("\n")
     return "\n".join([*lines, *([""] * rng.randrange(3))])
 

@@ -56,11 +56,11 @@ class Servers(NamedTuple):
     directory: Path
 
     def ask(self, url: str, work: Callable[[Client], Any]) -> Any:
-        async def asked() -> Any:
+        async def connected() -> Any:
             async with Client(url) as client:
                 return await work(client)
 
-        return self.loop.run(asked())
+        return self.loop.run(connected())
 
 
 @pytest.fixture(scope="module")
@@ -230,8 +230,8 @@ async def _project_content(client: Client) -> Any:
     types = {one.id: (await rest.object_type(one.id)).source for one in await rest.object_types()}
     models = [await rest.model(name) for name in await rest.models()]
     disabled = [meta.type for meta in await client.get_object_types() if meta.disabled]
-    kept = await rest.kept_parameters(project.id)
-    return untimed, types, sorted(models, key=lambda model: model.id), disabled, kept
+    parameters = await rest.kept_parameters(project.id)
+    return untimed, types, sorted(models, key=lambda model: model.id), disabled, parameters
 
 
 def test_differences_are_named_and_replaced_only_on_request(cli: Any, servers: Servers) -> None:

@@ -58,9 +58,9 @@ def test_a_reachable_device_is_checked(tmp_path: Path, scale: FakeProcess) -> No
     assert header.split()[:6] == ["name", "type", "address", "connection", "identity", "health"]
     for word in ("balance", "MtSicsScale", port, "online", "MS3002S", "normal"):
         assert word in row
-    asked = set(scale.truth()["received"][received:])
-    assert asked, "the device received requests"
-    assert not [line for line in asked if line.split()[0] in ("T", "Z", "TI", "ZI", "TA", "TAC", "@")], asked
+    commands = set(scale.truth()["received"][received:])
+    assert commands, "the device received no commands"
+    assert not [line for line in commands if line.split()[0] in ("T", "Z", "TI", "ZI", "TA", "TAC", "@")], commands
 
 
 def test_every_problem_is_reported(tmp_path: Path, scale: FakeProcess) -> None:

@@ -315,12 +315,12 @@ def test_a_command_that_ends_without_success_is_a_fault(
 ) -> None:
     wait, accepted = device.wait, threading.Event()
 
-    def noted(holds: Any, timeout: float, what: str, *options: Any) -> Any:
+    def signalling_wait(holds: Any, timeout: float, what: str, *options: Any) -> Any:
         if what == "tighten":  # the wait before is for its acknowledgement
             accepted.set()
         return wait(holds, timeout, what, *options)
 
-    monkeypatch.setattr(device, "wait", noted)
+    monkeypatch.setattr(device, "wait", signalling_wait)
     thread, outcome = run_in_thread(lambda: device.tighten("soft", 10.0))
     assert accepted.wait(30.0)
     fake.control.do("set", state=3, working=False)

@@ -160,12 +160,12 @@ class Edits(RuleBasedStateMachine):
     def edit_together(self, parts: list[Any]) -> None:
         async def together() -> None:
             wanted = [(EDITS[kind](Draw(self.session, chosen)), undo) for kind, chosen, undo in parts]
-            asked = []
+            requests = []
             for number, ((request, args, _, _), undo) in enumerate(wanted):
                 if undo:
                     request, args = undo, {}
-                asked.append(self._ask(self.user_of(number), request, **args))
-            await asyncio.gather(*asked)
+                requests.append(self._ask(self.user_of(number), request, **args))
+            await asyncio.gather(*requests)
 
         before = self.session.revision
         self.runner.run(together())

@@ -47,19 +47,19 @@ def outcome(answer: dict[str, Any]) -> str:
     return "refused: " + next((name for name, pattern in CLASSES.items() if pattern.match(text)), "other")
 
 
-def differs(name: str, state: str, recorded: str, ours: str) -> bool:
+def differs(name: str, state: str, recorded: str, actual: str) -> bool:
     """Return whether our outcome differs from the recorded one.
 
     The peer's "other" includes its messages about robots and cameras. Where nothing is open, it names the project in
     some refusals and the scene in others. Our refusals name the scene.
     """
     if recorded == UNANSWERED:
-        return ours == "ok"
+        return actual == "ok"
     if recorded == "refused: needs an open project" and state.endswith("no_scene"):
         recorded = "refused: needs an open scene"
     if recorded == "refused: other":
-        return ours not in ("refused: other", "refused: needs other scene state")
-    return ours != recorded
+        return actual not in ("refused: other", "refused: needs other scene state")
+    return actual != recorded
 
 
 async def enter(stage: Stage, alice: Actor, state: str) -> None:
@@ -91,10 +91,10 @@ async def test_every_answer_in_every_state_equals_the_recorded_one(tmp_path: Pat
             await enter(stage, alice, state)
             person = stranger if state.startswith("unregistered") else alice
             for name, recorded in rows.items():
-                ours = outcome(await person.send(request(name, stage.ids.get("scene", "x"))))
+                actual = outcome(await person.send(request(name, stage.ids.get("scene", "x"))))
                 compared += 1
-                if differs(name, state, recorded, ours):
-                    wrong[f"{name} in {state}"] = f"{recorded}, not {ours}"
+                if differs(name, state, recorded, actual):
+                    wrong[f"{name} in {state}"] = f"{recorded}, not {actual}"
                 for event in person.events():
                     assert event["event"] in ("ObjectsLocked", "ObjectsUnlocked"), (name, state, event)
         assert compared == 666

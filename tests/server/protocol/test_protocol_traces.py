@@ -62,7 +62,7 @@ class Exchange:
 NO_RESPONSE = "NO RESPONSE TO"
 """Placeholder in a recorded session where nothing was sent."""
 REFUSED = ("b3", "b3_copy")
-"""The action that request 103 adds to the recorded project but not to ours, and its copy."""
+"""The action that request 103 adds to the recorded project but not to the replayed one, and its copy."""
 
 
 def without_refused(value: Any) -> Any:
@@ -122,19 +122,19 @@ def normalized(messages: list[dict[str, Any]]) -> Any:
     return plain(comparable(messages))
 
 
-def first_difference(ours: Any, theirs: Any, where: str = "") -> str:
+def first_difference(actual: Any, expected: Any, where: str = "") -> str:
     """Name the first place where two documents differ; empty if they are equal."""
-    match ours, theirs:
+    match actual, expected:
         case dict(), dict():
-            if only := sorted(ours.keys() ^ theirs.keys()):
+            if only := sorted(actual.keys() ^ expected.keys()):
                 return f"{where}: only one has {', '.join(only)}"
-            pairs = [(key, ours[key], theirs[key]) for key in ours]
+            pairs = [(key, actual[key], expected[key]) for key in actual]
         case list(), list():
-            if len(ours) != len(theirs):
-                return f"{where}: {ours} instead of {theirs}"
-            pairs = [(str(index), *both) for index, both in enumerate(zip(ours, theirs, strict=True))]
+            if len(actual) != len(expected):
+                return f"{where}: {actual} instead of {expected}"
+            pairs = [(str(index), *both) for index, both in enumerate(zip(actual, expected, strict=True))]
         case _:
-            return "" if ours == theirs else f"{where}: {ours!r} instead of {theirs!r}"
+            return "" if actual == expected else f"{where}: {actual!r} instead of {expected!r}"
     return next(filter(None, (first_difference(a, b, f"{where}/{key}") for key, a, b in pairs)), "")
 
 
@@ -190,13 +190,13 @@ class Replay:
             if number not in DIFFERENT:
                 raise AssertionError(f"{client} at {exchange.request}: {got()} instead of {expected}") from None
         self.continual.setdefault(number, {})[client] = [m for m in person.waiting if m.get("event") in CONTINUAL]
-        ours = in_order(exchange, [message for message in person.take() if message.get("event") not in CONTINUAL])
+        actual = in_order(exchange, [message for message in person.take() if message.get("event") not in CONTINUAL])
         expected = in_order(exchange, expected)
-        self.mapping.learn(expected, ours)
+        self.mapping.learn(expected, actual)
         if number not in DIFFERENT:
-            difference = first_difference(normalized(ours), normalized(self.mapping.to_ours(expected)))
+            difference = first_difference(normalized(actual), normalized(self.mapping.to_ours(expected)))
             assert not difference, f"{client} at {exchange.request}: {difference}"
-            self.compared += len(ours)
+            self.compared += len(actual)
 
 
 async def test_all_recorded_sessions_result_in_the_same_messages(tmp_path: Path) -> None:
@@ -224,10 +224,10 @@ def _recorded(name: str, number: int) -> dict[str, Any]:
 def check_different_answers(replay: Replay) -> None:
     """Check answers that differ on purpose: the common part must be equal, or our answer better."""
     first = SESSIONS[0]
-    ours, theirs = replay.answers[3]["data"], _recorded(first, 3)["data"]
-    assert set(theirs["supported_rpc_requests"]) <= set(ours["supported_rpc_requests"])
-    assert sorted(theirs["supported_parameter_types"]) == sorted(ours["supported_parameter_types"])
-    assert (theirs["version"], theirs["api_version"]) == (ours["version"], ours["api_version"])
+    actual, expected = replay.answers[3]["data"], _recorded(first, 3)["data"]
+    assert set(expected["supported_rpc_requests"]) <= set(actual["supported_rpc_requests"])
+    assert sorted(expected["supported_parameter_types"]) == sorted(actual["supported_parameter_types"])
+    assert (expected["version"], expected["api_version"]) == (actual["version"], actual["api_version"])
     metas = {meta["type"]: meta for meta in replay.answers[4]["data"]}
     for meta in _recorded(first, 4)["data"]:
         if meta["built_in"] or meta["type"] == "WeighingMachine":
@@ -235,8 +235,8 @@ def check_different_answers(replay: Replay) -> None:
     moves = {action["name"]: action for action in replay.answers[5]["data"]}
     for action in _recorded(first, 5)["data"]:
         if action["name"] in ("move", "update_pose"):
-            ours = moves[action["name"]] | {"origins": action["origins"]}  # the recorded flow inherits it
-            assert without_texts(comparable(ours)) == without_texts(action)
+            actual = moves[action["name"]] | {"origins": action["origins"]}  # the recorded flow inherits it
+            assert without_texts(comparable(actual)) == without_texts(action)
     robots = {meta["type"]: meta for meta in replay.answers[6]["data"]}
     recorded = next(meta for meta in _recorded(first, 6)["data"] if meta["type"] == ROBOT)
     assert robots[ROBOT]["features"] == recorded["features"]
@@ -261,8 +261,8 @@ def check_streams(replay: Replay) -> None:
         recorded = next(
             line["msg"] for line in session(SESSIONS[2]) if line["msg"].get("event") == event and line["who"] == "A<"
         )
-        ours = [message for message in received["A"] if message["event"] == event]
-        assert normalized([ours[0]]) == normalized([replay.mapping.to_ours(recorded)])
+        actual = [message for message in received["A"] if message["event"] == event]
+        assert normalized([actual[0]]) == normalized([replay.mapping.to_ours(recorded)])
         assert received["B"] == []
     assert replay.continual[70]["A"] == [], "nothing is sent after the subscription ends"
 

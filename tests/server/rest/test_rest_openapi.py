@@ -30,10 +30,10 @@ SNAKE = {"LineCheckResult", "MarkerCorners"}
 
 
 class Comparison:
-    """Compares a schema of the original with ours and records the differences."""
+    """Compares a schema of the original services with the schema of this server, and records the differences."""
 
-    def __init__(self, theirs: dict[str, Any], ours: dict[str, Any]) -> None:
-        self.parts = theirs["components"]["schemas"], ours["components"]["schemas"]
+    def __init__(self, original: dict[str, Any], actual: dict[str, Any]) -> None:
+        self.parts = original["components"]["schemas"], actual["components"]["schemas"]
         self.differences: list[str] = []
         self.seen: set[str] = set()
 
@@ -51,44 +51,46 @@ class Comparison:
         merged["required"] += schema.get("required", [])
         return merged | {key: value for key, value in schema.items() if key not in ("properties", "required", "allOf")}
 
-    def same(self, where: str, theirs: dict[str, Any], ours: dict[str, Any]) -> None:
-        name = theirs.get("$ref", "").rpartition("/")[2]
+    def same(self, where: str, original: dict[str, Any], actual: dict[str, Any]) -> None:
+        name = original.get("$ref", "").rpartition("/")[2]
         if name and (name, where.startswith("body")) in self.seen:
             return
         self.seen.add((name, where.startswith("body")))  # type: ignore[arg-type]
-        theirs, ours = self.resolved(theirs, 0), self.resolved(ours, 1)
-        if theirs.get("type", "object") != ours.get("type", "object"):
-            self.differences.append(f"{where}: {ours.get('type')} for {theirs.get('type')}")
-        if "enum" in theirs and set(theirs["enum"]) != set(ours.get("enum", ())):
-            self.differences.append(f"{where}: {ours.get('enum')} for {theirs['enum']}")
-        if "items" in theirs:
-            self.same(f"{where}[]", theirs["items"], ours["items"])
+        original, actual = self.resolved(original, 0), self.resolved(actual, 1)
+        if original.get("type", "object") != actual.get("type", "object"):
+            self.differences.append(f"{where}: {actual.get('type')} for {original.get('type')}")
+        if "enum" in original and set(original["enum"]) != set(actual.get("enum", ())):
+            self.differences.append(f"{where}: {actual.get('enum')} for {original['enum']}")
+        if "items" in original:
+            self.same(f"{where}[]", original["items"], actual["items"])
         rename = (lambda key: key) if name in SNAKE else camel
-        needed = {rename(key) for key in theirs["required"]}
-        if needed != set(ours["required"]) and theirs["properties"]:
-            self.differences.append(f"{where}: needs {sorted(ours['required'])}, not {sorted(needed)}")
-        if {rename(key) for key in theirs["properties"]} - set(ours["properties"]):
-            self.differences.append(f"{where}: has {sorted(ours['properties'])}, not {sorted(theirs['properties'])}")
+        needed = {rename(key) for key in original["required"]}
+        if needed != set(actual["required"]) and original["properties"]:
+            self.differences.append(f"{where}: needs {sorted(actual['required'])}, not {sorted(needed)}")
+        if {rename(key) for key in original["properties"]} - set(actual["properties"]):
+            self.differences.append(
+                f"{where}: has {sorted(actual['properties'])}, not {sorted(original['properties'])}"
+            )
             return
-        for key, part in theirs["properties"].items():
-            self.same(f"{where}.{key}", part, ours["properties"][rename(key)])
+        for key, part in original["properties"].items():
+            self.same(f"{where}.{key}", part, actual["properties"][rename(key)])
 
 
 @pytest.mark.parametrize("name", SERVICES)
 def test_the_document_matches_the_original_operations(name: str) -> None:
-    theirs = openapi(name)
-    ours = document(SERVICES[name])
-    compare = Comparison(theirs, ours)
+    original = openapi(name)
+    actual = document(SERVICES[name])
+    compare = Comparison(original, actual)
     differences = compare.differences
-    for path, operations in theirs["paths"].items():
-        for method, their in operations.items():
+    for path, operations in original["paths"].items():
+        for method, original_operation in operations.items():
             where = f"{method} {path}"
-            our = ours["paths"].get(path, {}).get(method)
-            if our is None:
+            operation = actual["paths"].get(path, {}).get(method)
+            if operation is None:
                 differences.append(f"{where} is missing")
                 continue
-            parameters = {one["name"]: one for one in our["parameters"]}
-            for wanted in their.get("parameters", ()):
+            parameters = {one["name"]: one for one in operation["parameters"]}
+            for wanted in original_operation.get("parameters", ()):
                 # A path parameter may have any name; a query parameter may not.
                 found = parameters.get(wanted["name"])
                 if found is None or found["in"] != wanted["in"]:
@@ -97,14 +99,14 @@ def test_the_document_matches_the_original_operations(name: str) -> None:
                     differences.append(f"{where}: {wanted['name']} is {found['schema']}")
                 elif wanted.get("required") and not found["required"]:
                     differences.append(f"{where}: {wanted['name']} is not required")
-            for kind, content in their.get("requestBody", {}).get("content", {}).items():
-                got = our["requestBody"]["content"][kind]["schema"]
+            for kind, content in original_operation.get("requestBody", {}).get("content", {}).items():
+                got = operation["requestBody"]["content"][kind]["schema"]
                 if kind == "application/json":
                     compare.same(f"body of {where}", content["schema"], got)
                 else:
                     assert set(got["properties"]) == set(content["schema"]["properties"])
-            for kind, content in their["responses"]["200"].get("content", {}).items():
-                got = our["responses"]["200"]["content"][kind]["schema"]
+            for kind, content in original_operation["responses"]["200"].get("content", {}).items():
+                got = operation["responses"]["200"]["content"][kind]["schema"]
                 if "oneOf" in content["schema"]:
                     for one, other in zip(content["schema"]["oneOf"], got["oneOf"], strict=True):
                         compare.same(f"answer of {where}", one, other)

@@ -40,16 +40,16 @@ async def worker(services: Server) -> None:
 @pytest.fixture
 def runs(services: Server, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Record the names of the meshes that the worker prepares."""
-    asked: list[str] = []
+    names: list[str] = []
     run = services.compute.run
 
     async def counted(task: Any, **more: Any) -> Any:
         if isinstance(task, PrepareAsset):
-            asked.append(task.file.name)
+            names.append(task.file.name)
         return await run(task, **more)
 
     monkeypatch.setattr(services.compute, "run", counted)
-    return asked
+    return names
 
 
 async def put(http: httpx.AsyncClient, key: str, content: bytes, name: str = "", **query: Any) -> None:

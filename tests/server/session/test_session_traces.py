@@ -18,7 +18,7 @@ ID = re.compile(r"\b(?:scn|obj|pro|acp|ori|joi|act|lit|pco|pkg)_[0-9a-f]{32}\b")
 
 
 class Mapping:
-    """Recorded ids and ours, paired by the order in which they appear."""
+    """Recorded and actual ids, paired by the order in which they appear."""
 
     def __init__(self) -> None:
         self._ours: dict[str, str] = {}
@@ -33,17 +33,17 @@ class Mapping:
                 return [self.to_ours(item) for item in value]
         return value
 
-    def learn(self, recorded: Any, ours: Any) -> None:
+    def learn(self, recorded: Any, actual: Any) -> None:
         """Pair ids that are at the same place."""
-        match recorded, ours:
+        match recorded, actual:
             case str(), str():
-                for theirs, mine in zip(ID.findall(recorded), ID.findall(ours), strict=False):
-                    self._ours.setdefault(theirs, mine)
+                for recorded_id, actual_id in zip(ID.findall(recorded), ID.findall(actual), strict=False):
+                    self._ours.setdefault(recorded_id, actual_id)
             case dict(), dict():
-                for key in recorded.keys() & ours.keys():
-                    self.learn(recorded[key], ours[key])
+                for key in recorded.keys() & actual.keys():
+                    self.learn(recorded[key], actual[key])
             case list(), list():
-                for one, other in zip(recorded, ours, strict=False):
+                for one, other in zip(recorded, actual, strict=False):
                     self.learn(one, other)
 
 
