@@ -25,6 +25,7 @@ from arcor2_server.fleet.file import FleetFile, FleetResult, ReceivedResult
 from arcor2_server.fleet.registry import MAX_PER_NAME, Registry
 from arcor2_server.fleet.reports import FleetReports
 from arcor2_server.fleet.summaries import of_alarm, of_unit
+from arcor2_server.nodes.confirmation import confirm_sent
 from arcor2_server.nodes.credentials import Credentials
 
 log = structlog.get_logger(__name__)
@@ -141,7 +142,7 @@ class Collector:
     async def _receive(self, client: Client) -> None:
         self._client = client
         await client.subscribe(r.STATES, cb=self._state_arrived)
-        await client.flush()
+        await confirm_sent(client)
         self.connected = True
         self._renew()
         await asyncio.Event().wait()

@@ -145,6 +145,7 @@ class NodeBoard:
             from nats.aio.msg import Msg
             from nats.errors import Error as NatsError
 
+            from arcor2_server.nodes.confirmation import confirm_sent
             from arcor2_server.nodes.connections import connect_client
             from arcor2_server.nodes.credentials import of_environment
         except ImportError:
@@ -159,7 +160,7 @@ class NodeBoard:
         client = await connect_client(of_environment(self._environment), "arcor2-hw nodes", lost.set)
         try:
             await client.subscribe(presence_subject("*"), cb=received)
-            await client.flush()
+            await confirm_sent(client)
             self._problem = None
             await lost.wait()
             raise ConnectionLost("The broker closed the connection.")

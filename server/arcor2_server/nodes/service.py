@@ -21,6 +21,7 @@ from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m, ring
 from arcor2_server.child_process import ChildProcess, LockedFolder, describe_exit, remove_leftovers
 from arcor2_server.nodes import connections as broker
+from arcor2_server.nodes.confirmation import confirm_sent
 from arcor2_server.nodes.content import WITH_FILES, ContentStore, default_store
 from arcor2_server.nodes.conversion import FRAMES, LARGE, STAMPED, MessageOutline, for_host, outline
 from arcor2_server.nodes.credentials import Credentials, environment_without
@@ -344,7 +345,7 @@ class NodeService:
             try:
                 calls = self._connections[Lane.CALLS]
                 await calls.subscribe(broker.open_subject(self._name), cb=self._open)
-                await calls.flush()
+                await confirm_sent(calls)
             except (NatsError, OSError) as error:
                 raise ConnectionLost("The broker closed the connection.", str(error)) from error
             log.info("node ready", node=self._name)

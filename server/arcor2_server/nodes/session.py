@@ -13,6 +13,7 @@ from nats.errors import Error as NatsError
 
 from arcor2_hw.exceptions import ConnectionLost
 from arcor2_hw.messages import Message
+from arcor2_server.nodes.confirmation import confirm_sent
 from arcor2_server.nodes.content import Content
 from arcor2_server.nodes.lanes import END, Header, Lane, LaneReader, LaneWriter, MessageLost
 from arcor2_server.nodes.session_clock import SessionClock
@@ -104,7 +105,7 @@ class SessionEnd:
         await self._subscribe(Lane.STOP, f"{self._in}.beat", self._beaten)
         await self._subscribe(Lane.FRAMES, f"{self._in}.confirmed", self._confirmed)
         for client in self._connections.values():
-            await client.flush()
+            await confirm_sent(client)
         self._beat_at = time.monotonic()
 
     async def _subscribe(self, lane: Lane, subject: str, handle: Callable[[Msg], Awaitable[None]]) -> None:
@@ -148,7 +149,7 @@ class SessionEnd:
                 self.send_end(reason)
                 await self._queues[Lane.STOP].join()
                 await self._queues[Lane.CALLS].join()
-                await self._connections[Lane.CALLS].flush()
+                await confirm_sent(self._connections[Lane.CALLS])
         except (TimeoutError, NatsError, OSError):
             pass  # the peer notices the silence
         self.end(reason)

@@ -22,6 +22,7 @@ from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.hosts.process import CellHost
 from arcor2_server.nodes import opening, pairing
 from arcor2_server.nodes.accounts import Accounts, listening_address
+from arcor2_server.nodes.confirmation import confirm_sent
 from arcor2_server.nodes.connections import answer_subject, connect_client
 from arcor2_server.nodes.credentials import Credentials, load, node_file, require_tls
 from arcor2_server.nodes.nkeys import Kind, SigningKey, is_user_key
@@ -139,16 +140,16 @@ async def test_a_node_reaches_only_its_own_subjects(server: Server) -> None:
     try:
         for client in (hub.client, oven.client):
             await client.subscribe("arcor2.oven.>" if client is oven.client else ">", cb=receive)
-            await client.flush()
+            await confirm_sent(client)
         for subject in FORBIDDEN:
             await press.client.publish(subject, b"x")
         for subject in (*FORBIDDEN, "arcor2.oven.>", "arcor2.*.open", "arcor2.>", ">", "_INBOX.>"):
             await press.client.subscribe(subject, cb=receive)
         await press.client.subscribe(f"arcor2.{NODE}.open", cb=answer)
         await press.client.publish(f"arcor2.{NODE}.session.node.calls", b"x")
-        await press.client.flush()
-        await hub.client.flush()
-        await oven.client.flush()
+        await confirm_sent(press.client)
+        await confirm_sent(hub.client)
+        await confirm_sent(oven.client)
         assert [each for each in received if not each.startswith("$SYS")] == [f"arcor2.{NODE}.session.node.calls"]
         assert len(press.errors) == 2 * len(FORBIDDEN) + 5, press.errors
         assert all("permissions violation" in each for each in press.errors)
@@ -158,7 +159,7 @@ async def test_a_node_reaches_only_its_own_subjects(server: Server) -> None:
         relay = await connect_client(load(server.settings.broker_credentials), "relay", answers=answer_subject(NODE))
         assert (await relay.request(f"arcor2.{NODE}.open", b"x", 5.0)).data == b"answer"
         await relay.close()
-        await oven.client.flush()
+        await confirm_sent(oven.client)
         assert 'permissions violation for publish to "arcor2.oven.open"' in press.errors[-1]
         assert "arcor2.oven.open" not in received
     finally:

@@ -1,5 +1,6 @@
 """Parts of a session without a broker: clocks, lanes, and commands that must not be executed any more."""
 
+import asyncio
 import hashlib
 import os
 import random
@@ -20,8 +21,11 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_server.nodes.confirmation import confirm_sent
+from arcor2_server.nodes.connections import connect_client
 from arcor2_server.nodes.content import Content, ContentStore
 from arcor2_server.nodes.conversion import for_host, for_server
+from arcor2_server.nodes.credentials import Credentials
 from arcor2_server.nodes.lanes import END, PART_SIZE, Header, Lane, LaneReader, LaneWriter, MessageLost
 from arcor2_server.nodes.opening import Opening, refusal_of
 from arcor2_server.nodes.presence import own_version
@@ -293,3 +297,24 @@ def test_a_damaged_file_is_not_stored(tmp_path: Path) -> None:
     with pytest.raises(InvalidData, match="damaged"):
         ContentStore(tmp_path).add(hashlib.sha256(b"one").digest() + b"other")
     assert not list(tmp_path.iterdir())
+
+
+async def test_the_broker_confirms_a_subscription_that_was_still_to_be_sent() -> None:
+    """A plain `flush` of nats-py sends its ping before the subscription."""
+    commands: list[bytes] = []
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b'INFO {"max_payload": 1048576}\r\n')
+        while command := await reader.readline():
+            commands.append(command.split()[0])
+            if commands[-1] == b"PING":
+                writer.write(b"PONG\r\n")
+        writer.close()
+
+    async with await asyncio.start_server(answer, "127.0.0.1") as broker:
+        port = broker.sockets[0].getsockname()[1]
+        client = await connect_client(Credentials(f"nats://127.0.0.1:{port}"), "test")
+        await client.subscribe("arcor2.press.open")
+        await confirm_sent(client)
+        assert commands[-2:] == [b"SUB", b"PING"]
+        await client.close()
