@@ -33,6 +33,8 @@ PATIENCE = 20.0  # time limit, s; the machine may be busy
 
 
 class HostProcess:
+    """A cell host. Its messages are stored in `seen`, except heartbeats."""
+
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
         memory = create()
@@ -68,10 +70,10 @@ class HostProcess:
             left = deadline - time.monotonic()
             ready, _, _ = select.select([self.socket], [], [], max(left, 0))
             if not ready:
-                raise AssertionError(f"nothing came; seen: {self.seen[-20:]}")
+                raise AssertionError(f"no message arrived; seen: {self.seen[-20:]}")
             chunk = self.socket.recv(1 << 20)
             if not chunk:
-                raise EOFError(f"the host is gone; seen: {self.seen[-20:]}, output: {self.output()}")
+                raise EOFError(f"the host has ended; seen: {self.seen[-20:]}, output: {self.output()}")
             self._buffer += chunk
 
     def expect(self, kind: type[T], where: Callable[[T], bool] = lambda _: True, within: float = PATIENCE) -> T:

@@ -7,7 +7,7 @@ from arcor2_web import rest
 
 
 class KinematicsMixin:
-    """What two robots share."""
+    """Methods that two robots share."""
 
     def inverse_kinematics(
         self, end_effector_id: str, pose: Pose, start_joints: None | list[Joint] = None, avoid_collisions: bool = True

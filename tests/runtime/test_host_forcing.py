@@ -51,11 +51,11 @@ def outputs(block: FakeProcess) -> dict[str, Any]:
     return {"red": on[0], "green": on[2], "valve": on[4], "lock": on[6], "speed": truth["analog_outputs"][0]}
 
 
-def changes_to(block: FakeProcess, **wanted: Any) -> None:
+def wait_for_outputs(block: FakeProcess, **wanted: Any) -> None:
     wait_for(lambda: outputs(block), lambda found: wanted.items() <= found.items())
 
 
-def refused(host: HostProcess, text: str, *arguments: Any, **more: Any) -> None:
+def assert_refused(host: HostProcess, text: str, *arguments: Any, **more: Any) -> None:
     error = force(host, *arguments, **more)
     assert isinstance(error, m.ErrorData)
     assert text in error.message.text
@@ -66,15 +66,15 @@ def test_a_forced_output_keeps_its_value_and_is_switched_back(host: HostProcess,
     assert host.call("obj_io", "write_digital", name="valve", value=True) is None
     assert force(host, "valve", False, 1) == {"before": True, "unit": ""}
     assert force(host, "speed", 1.5, 2) == {"before": 0.0, "unit": "m/s"}
-    changes_to(block, valve=False, speed=150)
+    wait_for_outputs(block, valve=False, speed=150)
     for method, value in (("write_digital", {"value": True}), ("pulse", {"duration": 0.1})):
         error = host.call("obj_io", method, name="valve", **value)
         assert error.message.text.endswith("valve is forced. End the force first.")
-    refused(host, "forced already", "valve", True, 3)
+    assert_refused(host, "forced already", "valve", True, 3)
 
     host.send(m.EndForce(50, 1))
     assert host.answer(50) is None
-    changes_to(block, valve=True, speed=150)
+    wait_for_outputs(block, valve=True, speed=150)
     assert host.call("obj_io", "write_digital", name="valve", value=False) is None
     host.send(m.EndForce(51, 1))  # it has ended
     assert host.answer(51) is None
@@ -88,18 +88,18 @@ def test_a_force_ends_unless_it_is_renewed(host: HostProcess, block: FakeProcess
     assert ended.force == 1
     assert ended.error is not None
     assert ended.error.message.text == "io: the force of valve was not renewed in time"
-    changes_to(block, valve=False, lock=True)
+    wait_for_outputs(block, valve=False, lock=True)
     time.sleep(0.3)  # the first lease of the other force has expired too
     assert outputs(block)["lock"] is True
 
 
-def test_points_that_cannot_be_forced(host: HostProcess, block: FakeProcess) -> None:
-    refused(host, "part is not an output", "part", True, 1)
-    refused(host, "clamp cannot be forced, because the device would keep the value", "clamp", True, 2)
-    refused(host, "has no point 'missing'", "missing", True, 3)
-    refused(host, "valve is digital", "valve", 1.0, 4)
-    refused(host, "speed is analogue", "speed", True, 5)
-    refused(host, "must be", "speed", 1e9, 6)
+def test_forces_of_other_points_and_with_invalid_values_are_refused(host: HostProcess, block: FakeProcess) -> None:
+    assert_refused(host, "part is not an output", "part", True, 1)
+    assert_refused(host, "clamp cannot be forced, because the device would keep the value", "clamp", True, 2)
+    assert_refused(host, "has no point 'missing'", "missing", True, 3)
+    assert_refused(host, "valve is digital", "valve", 1.0, 4)
+    assert_refused(host, "speed is analogue", "speed", True, 5)
+    assert_refused(host, "must be", "speed", 1e9, 6)
     force(host, "valve", True, 7)
     host.begin("obj_io", "wait_for", name="part", value=True, timeout=60.0)
     host.send(m.EndForce(60, 7))
@@ -111,22 +111,22 @@ def test_a_lamp_is_forced_while_the_tower_shows_a_state(host: HostProcess, block
     assert host.call("obj_tower", "take_control") is None
     assert force(host, "green", True, 1, of="tower") == {"before": False, "unit": ""}
     assert host.call("obj_tower", "show", color="red") is None
-    changes_to(block, green=True, red=True)
+    wait_for_outputs(block, green=True, red=True)
     assert host.call("obj_tower", "show", color="green") is None
     assert host.call("obj_tower", "show", color="red") is None
     assert outputs(block)["green"] is True
     host.send(m.EndForce(70, 1))
     assert host.answer(70) is None
-    changes_to(block, green=False, red=True)
+    wait_for_outputs(block, green=False, red=True)
 
 
 def test_forces_end_with_the_server(host: HostProcess, block: FakeProcess) -> None:
     host.call("obj_io", "take_control")
     force(host, "valve", True, 1)
-    changes_to(block, valve=True)
+    wait_for_outputs(block, valve=True)
     host.socket.close()  # as when the server is killed
     assert host.gone(5.0) == 0
-    changes_to(block, valve=False)
+    wait_for_outputs(block, valve=False)
     switched = [each["on"] for each in block.truth()["history"] if each["output"] == 4]
     assert switched == [True, False]
 
@@ -135,9 +135,9 @@ def test_forces_end_with_the_host(host: HostProcess, block: FakeProcess) -> None
     force(host, "valve", True, 1)
     force(host, "lock", False, 2)
     force(host, "red", False, 3, of="tower")
-    changes_to(block, valve=True)
+    wait_for_outputs(block, valve=True)
     host.process.kill()
-    changes_to(block, valve=False, lock=True, red=True)  # by the watchdogs of the block
+    wait_for_outputs(block, valve=False, lock=True, red=True)  # by the watchdogs of the block
 
 
 def test_forces_end_with_the_connection(host: HostProcess, block: FakeProcess) -> None:
@@ -146,7 +146,7 @@ def test_forces_end_with_the_connection(host: HostProcess, block: FakeProcess) -
     ended = host.expect(m.ForceEnded)
     assert ended.error is not None
     assert ended.error.code in ("connection_lost", "not_in_control")
-    changes_to(block, valve=False)
+    wait_for_outputs(block, valve=False)
     block.control.do("heal")
     host.expect(m.DeviceChanged, lambda change: change.object_id == "obj_io" and change.connection.value == "back")
     assert outputs(block)["valve"] is False

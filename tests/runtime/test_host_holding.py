@@ -33,7 +33,7 @@ class Arm(Robot):
         self.fault = ""
         self.hand = False
 
-    def note(self, what, *more): self.calls.append([what, time.monotonic(), *more])
+    def note(self, call, *more): self.calls.append([call, time.monotonic(), *more])
     def report(self): return self.calls
     def forget(self):
         self.calls, self.taking, self.hangs, self.at, self.fault = [], 0.0, 0.0, 0.0, ""
@@ -50,7 +50,7 @@ class Arm(Robot):
     def joint_limits(self): return {"turn": (-1.0, 1.0)}
     def forward_kinematics(self, end_effector_id, joints):
         turn = joints[0].value
-        return Pose(Position(0.8 * turn, 0.0, 0.0))  # a lever of 0.8 m, all but straight
+        return Pose(Position(0.8 * turn, 0.0, 0.0))  # a lever of 0.8 m that is almost straight
     def grippers(self): return set()
     def suctions(self): return set()
     def stop(self):
@@ -102,15 +102,15 @@ class Holder:
         return answer
 
     def hold_once(self, valid: float) -> float:
-        """Send one lease of a new hold. Return when, by the monotonic clock, after the host has accepted it.
+        """Send one lease of new holds until the host accepts it. Return the monotonic time of sending, s.
 
         If the lease expires before it arrives, as on a busy computer, another hold is started.
         """
         while True:
-            began = time.monotonic()
+            start = time.monotonic()
             answer = self.host.answer(self.lease(valid, new=True))
             if not isinstance(answer, m.ErrorData) or "had expired" not in answer.message.text:
-                return began
+                return start
 
     @contextlib.contextmanager
     def frozen(self) -> Iterator[None]:
@@ -124,15 +124,15 @@ class Holder:
         finally:
             os.kill(pid, signal.SIGCONT)
 
-    def ended(self) -> m.HoldEnded:
+    def wait_for_end(self) -> m.HoldEnded:
         known = [e for e in self.host.seen if isinstance(e, m.HoldEnded) and e.hold == self.hold]
         return known[0] if known else self.host.expect(m.HoldEnded, lambda e: e.hold == self.hold)
 
-    def calls(self, *what: str) -> list[list[Any]]:
-        return [one for one in self.host.call(OBJ, "report") if not what or one[0] in what]
+    def calls(self, *names: str) -> list[list[Any]]:
+        return [one for one in self.host.call(OBJ, "report") if not names or one[0] in names]
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["in the cell host", "in its own process"])
+@pytest.fixture(scope="module", params=[False, True], ids=["in the cell host", "in a separate process"])
 def hosted(request: pytest.FixtureRequest) -> Iterator[Holder]:
     host = HostProcess()
     source = ARM.replace("_ABSTRACT = False", f"_ABSTRACT = False; own_process = {request.param}")
@@ -154,7 +154,7 @@ def test_the_robot_moves_while_leases_are_renewed(holder: Holder) -> None:
         time.sleep(0.3)
         holder.granted()
     assert holder.host.answer(holder.lease(0.0)) is None
-    ended = holder.ended()
+    ended = holder.wait_for_end()
     assert ended.error is None
     jogs, stops = holder.calls("jog"), holder.calls("stop")
     assert len(jogs) == 9
@@ -164,18 +164,18 @@ def test_the_robot_moves_while_leases_are_renewed(holder: Holder) -> None:
 
 
 def test_an_expired_hold_stops_and_does_not_start_again(holder: Holder) -> None:
-    began = holder.hold_once(0.15)
-    ended = holder.ended()
+    start = holder.hold_once(0.15)
+    ended = holder.wait_for_end()
     assert ended.error is not None
     assert "not renewed in time" in ended.error.message.text
     assert "arm" in ended.error.message.text
     (stop,) = holder.calls("stop")
-    assert stop[1] - began >= 0.15
+    assert stop[1] - start >= 0.15
     assert "has ended" in holder.refused().message.text
     assert len(holder.calls("jog")) == 1
     holder.granted(new=True)
     holder.lease(0.0)
-    holder.ended()
+    holder.wait_for_end()
 
 
 def test_a_late_lease_is_refused(holder: Holder) -> None:
@@ -199,7 +199,7 @@ def test_a_lease_that_arrives_after_a_freeze_does_not_resume_an_expired_hold(hol
         error = holder.host.answer(renewal)
         assert isinstance(error, m.ErrorData)
         assert re.search("not renewed in time|motion has ended", error.message.text)
-        holder.ended()
+        holder.wait_for_end()
     assert len(holder.calls("jog")) == 4
 
 
@@ -209,7 +209,7 @@ def test_a_second_hold_of_a_robot_is_refused(holder: Holder) -> None:
     assert "already moving" in holder.refused().message.text
     holder.hold -= 1
     holder.lease(0.0)
-    holder.ended()
+    holder.wait_for_end()
 
 
 def test_motion_starts_after_slow_control_only_if_the_hold_continues(holder: Holder) -> None:
@@ -222,13 +222,13 @@ def test_motion_starts_after_slow_control_only_if_the_hold_continues(holder: Hol
     assert all(holder.host.answer(number) == {"scale": 1.0} for number in numbers)
     assert len(holder.calls("jog")) < len(numbers)  # leases that arrived meanwhile are merged into one
     holder.lease(0.0)
-    holder.ended()
+    holder.wait_for_end()
 
     holder.host.call(OBJ, "forget")
     holder.host.call(OBJ, "set", key="taking", value=0.6)
     holder.host.call(OBJ, "lose_control")
     holder.hold_once(0.2)
-    error = holder.ended().error
+    error = holder.wait_for_end().error
     assert error is not None
     assert "not renewed" in error.message.text
     assert holder.calls("jog") == []
@@ -236,19 +236,19 @@ def test_motion_starts_after_slow_control_only_if_the_hold_continues(holder: Hol
 
 def test_a_stop_reaches_a_robot_whose_driver_hangs(holder: Holder) -> None:
     holder.host.call(OBJ, "set", key="hangs", value=1.5)
-    began = holder.hold_once(0.2)
-    ended = holder.ended()
+    start = holder.hold_once(0.2)
+    ended = holder.wait_for_end()
     assert ended.error is not None
     calls = holder.calls()
     assert [call[0] for call in calls[:3]] == ["jog", "stop", "jogged"]
-    assert calls[1][1] - began >= 0.2
+    assert calls[1][1] - start >= 0.2
 
 
 def test_a_stop_ends_the_hold(holder: Holder) -> None:
     holder.granted(new=True)
     holder.host.send(m.StopMotion(77, OBJ))
     assert holder.host.answer(77) is None
-    ended = holder.ended()
+    ended = holder.wait_for_end()
     assert ended.error is not None
     assert "was stopped" in ended.error.message.text
     assert holder.refused().message.text
@@ -258,12 +258,12 @@ def test_an_error_of_the_driver_ends_the_hold(holder: Holder) -> None:
     holder.granted(new=True)
     holder.host.call(OBJ, "set_fault", fault="protective stop of 192.0.2.1")
     assert "protective stop" in holder.refused().message.text
-    ended = holder.ended()
+    ended = holder.wait_for_end()
     assert ended.error is not None
     assert (ended.error.code, ended.error.object_id) == ("safety_stop", OBJ)
     assert holder.calls("stop")
     assert "protective stop" in holder.refused(new=True).message.text
-    holder.ended()
+    holder.wait_for_end()
 
 
 def test_the_end_effector_never_exceeds_the_reduced_speed(holder: Holder) -> None:
@@ -276,7 +276,7 @@ def test_the_end_effector_never_exceeds_the_reduced_speed(holder: Holder) -> Non
     assert last[2] is None
     assert last[3] == pytest.approx([scale, 0.0])
     holder.lease(0.0)
-    holder.ended()
+    holder.wait_for_end()
 
 
 def test_a_joint_slows_down_before_its_limit_and_stops_there(holder: Holder) -> None:
@@ -287,10 +287,10 @@ def test_a_joint_slows_down_before_its_limit_and_stops_there(holder: Holder) -> 
     holder.host.call(OBJ, "set", key="at", value=0.995)
     error = holder.refused(joints=[Joint("turn", 0.25)])
     assert "the joint turn is at its upper limit" in error.message.text
-    holder.ended()
+    holder.wait_for_end()
     assert holder.granted(new=True, joints=[Joint("turn", -0.25)]) == 1.0
     holder.lease(0.0)
-    holder.ended()
+    holder.wait_for_end()
 
 
 def test_a_twist_slows_down_before_a_joint_limit(holder: Holder) -> None:
@@ -301,12 +301,12 @@ def test_a_twist_slows_down_before_a_joint_limit(holder: Holder) -> None:
     time.sleep(0.1)
     holder.host.call(OBJ, "set", key="at", value=0.999)
     assert "turn is at its upper limit" in holder.refused().message.text
-    holder.ended()
+    holder.wait_for_end()
     assert holder.granted(new=True) < 0.1  # the direction is not known yet
     holder.host.call(OBJ, "set", key="at", value=0.9)
     holder.granted()
     holder.lease(0.0)
-    holder.ended()
+    holder.wait_for_end()
 
 
 @pytest.mark.parametrize(
@@ -318,14 +318,14 @@ def test_a_twist_slows_down_before_a_joint_limit(holder: Holder) -> None:
 )
 def test_unknown_joints_and_end_effectors_are_refused(holder: Holder, more: Any, text: str) -> None:
     assert text in holder.refused(new=True, **more).message.text
-    holder.ended()
+    holder.wait_for_end()
     assert holder.calls("jog") == []
 
 
 def test_hand_teaching_lasts_while_it_is_held(holder: Holder) -> None:
     for number in range(3):
         holder.granted(1.5, kind=HoldKind.HAND_TEACHING, new=number == 0)
-    ended = holder.ended()
+    ended = holder.wait_for_end()
     assert ended.error is not None
     assert [one[2] for one in holder.calls("hand")] == [True, False]
     assert holder.host.call(OBJ, "get_hand_teaching_mode") is False
@@ -358,22 +358,22 @@ class Arms(MultiArmRobot):
 """
 
 
-def test_one_of_several_arms_is_held(host: HostProcess) -> None:
+def test_a_hold_moves_one_of_several_arms(host: HostProcess) -> None:
     host.send(open_scene([type_code("Arms", ARMS)], scene_object("arm", "Arms", pose=True)))
     host.expect(m.SceneOpened)
     holder = Holder(host)
     assert holder.granted(new=True, arm_id="left") == 1.0
     assert 0.45 < holder.granted(joints=[Joint("left_turn", 1.0)], arm_id="left") <= 0.5
     holder.lease(0.0, arm_id="left")
-    holder.ended()
+    holder.wait_for_end()
     assert "Select one of claw, cup." in holder.refused(new=True, arm_id="right").message.text
-    holder.ended()
+    holder.wait_for_end()
     assert holder.granted(new=True, arm_id="right", end_effector_id="cup") == 1.0
     holder.lease(0.0, arm_id="right")
-    holder.ended()
+    holder.wait_for_end()
     holder.granted(kind=HoldKind.HAND_TEACHING, new=True, arm_id="right")
     holder.lease(0.0, kind=HoldKind.HAND_TEACHING)
-    holder.ended()
+    holder.wait_for_end()
     calls = [call for call in host.call(OBJ, "report") if call[0] != "stop"]
     assert [call[-1] for call in calls] == ["left", "left", "right", "right", "right"]
     assert calls[1][2] == pytest.approx([0.475])

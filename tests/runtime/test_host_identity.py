@@ -65,7 +65,7 @@ class Unit(Generic):
 KNOWN = Identity("Maker", "Unit 5", "A1", "1.0")
 
 
-def unit(directory: Path, **state: object) -> Path:
+def write_unit(directory: Path, **state: object) -> Path:
     file = directory / "unit.json"
     part = file.with_suffix(".part")
     part.write_text(json.dumps({"serial": "A1", "firmware": "1.0"} | state))
@@ -84,18 +84,18 @@ def scene(directory: Path, known: Identity | None = None) -> m.OpenScene:
     return open_scene([type_code("Unit", DEVICE)], where, identities=identities)
 
 
-def refused(host: HostProcess) -> m.ErrorData:
+def refusal(host: HostProcess) -> m.ErrorData:
     host.send(m.Call(77, "obj_unit", "act", control=True))
     return host.expect(m.CallFailed, lambda failed: failed.id == 77).error
 
 
 def test_another_serial_number_is_refused_until_it_is_confirmed(host: HostProcess, tmp_path: Path) -> None:
-    unit(tmp_path, serial="B2")
+    write_unit(tmp_path, serial="B2")
     host.send(scene(tmp_path, KNOWN))
     report = host.expect(m.DeviceChanged, lambda report: bool(report.alarms))  # also before SceneOpened
     assert [alarm.code for alarm in report.alarms] == ["different_device"]
     other = Identity("Maker", "Unit 5", "B2", "1.0")
-    error = refused(host)
+    error = refusal(host)
     assert [each.identity for each in host.seen if isinstance(each, m.DeviceIdentified)] == [other]
     assert error.code == "different_device"
     assert "a different Unit 5: serial number B2 instead of A1" in error.message.text
@@ -110,34 +110,34 @@ def test_another_serial_number_is_refused_until_it_is_confirmed(host: HostProces
 
 
 def test_a_device_exchanged_during_a_loss_is_refused(host: HostProcess, tmp_path: Path) -> None:
-    unit(tmp_path)
+    write_unit(tmp_path)
     host.send(scene(tmp_path, KNOWN))
     host.expect(m.SceneOpened)
     host.send(m.Call(1, "obj_unit", "act", control=True))
     host.expect(m.CallDone, lambda done: done.id == 1)
-    unit(tmp_path, serial="B2", unplugged=True)
+    write_unit(tmp_path, serial="B2", unplugged=True)
     host.expect(m.DeviceChanged, lambda report: report.connection == "lost")
-    unit(tmp_path, serial="B2")
+    write_unit(tmp_path, serial="B2")
     host.expect(m.DeviceChanged, lambda report: report.connection == "back")
-    assert refused(host).code == "different_device"
+    assert refusal(host).code == "different_device"
     assert log(tmp_path) == ["control", "act"]
 
 
 def test_a_confirmed_device_without_an_answer_is_not_commanded(host: HostProcess, tmp_path: Path) -> None:
-    unit(tmp_path, silent=True)
+    write_unit(tmp_path, silent=True)
     host.send(scene(tmp_path, KNOWN))
     assert "no answer" in str(host.expect(m.DeviceIdentified).problem)
-    error = refused(host)
+    error = refusal(host)
     assert error.code == "refused"
     assert "it may be another device: no answer" in error.message.text
     assert log(tmp_path) == []
-    unit(tmp_path)
+    write_unit(tmp_path)
     host.send(m.Call(78, "obj_unit", "act", control=True))
     host.expect(m.CallDone, lambda done: done.id == 78)
 
 
 def test_an_unknown_device_is_only_reported(host: HostProcess, tmp_path: Path) -> None:
-    unit(tmp_path)
+    write_unit(tmp_path)
     host.send(scene(tmp_path))
     assert host.expect(m.DeviceIdentified).identity == KNOWN
     host.send(m.Call(78, "obj_unit", "act", control=True))
@@ -145,7 +145,7 @@ def test_an_unknown_device_is_only_reported(host: HostProcess, tmp_path: Path) -
 
 
 def test_a_program_does_not_start_with_another_firmware(host: HostProcess, package: Package, tmp_path: Path) -> None:
-    unit(tmp_path, firmware="1.1")
+    write_unit(tmp_path, firmware="1.1")
     where = scene_object("unit", "Unit", file=str(tmp_path / "unit.json"))
     body = 'res.objects["obj_unit"].act(an="act")'
     directory = package.write({"Unit": DEVICE}, [where], Project("project", "scn_1", id="pro_1"), body)

@@ -136,11 +136,11 @@ def streamed(host: HostProcess, event: str, rate: float) -> list[dict[str, Any]]
     return [msgspec.json.decode(one.encoded)["data"] for one in found]
 
 
-def test_streams_at_different_rates(host: HostProcess) -> None:
+def test_streams_have_the_requested_rates(host: HostProcess) -> None:
     host.send(open_scene([type_code("Arm", ARM)], scene_object("arm", "Arm", pose=True)))
     host.expect(m.SceneOpened)
     host.send(m.Subscribe("obj_arm", True, False))
-    began = time.monotonic()
+    start = time.monotonic()
     host.send(m.Stream("obj_arm", [30.0, 5.0], [20.0]))
 
     def all_streams() -> list[list[dict[str, Any]]]:
@@ -153,7 +153,7 @@ def test_streams_at_different_rates(host: HostProcess) -> None:
     wait_for(all_streams, lambda streams: len(streams[0]) > len(streams[1]) > len(streams[2]) >= 5)
     host.send(m.Stream("obj_arm", [5.0], []))
     fast, eef, slow = all_streams()
-    seconds = time.monotonic() - began
+    seconds = time.monotonic() - start
     for events, rate in ((fast, 30.0), (eef, 20.0), (slow, 5.0)):
         assert len(events) <= rate * seconds + 2
     # The time is that of the sample, on the clock of this machine.

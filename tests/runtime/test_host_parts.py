@@ -72,9 +72,9 @@ class Arm(Generic):
 def point(name: str, parent: str, *actions: str) -> ActionPoint:
     methods = {"pick": "pick", "insert": "place", "take": "pick", "into_box": "place", "scan": "scan", "test": "test"}
     flows = {name: [Flow(outputs=["code"] if name == "scan" else [])] for name in methods}
-    made = [Action(each, f"obj_arm/{methods[each]}", f"act_{each}", flows=flows[each]) for each in actions]
+    created = [Action(each, f"obj_arm/{methods[each]}", f"act_{each}", flows=flows[each]) for each in actions]
     orientation = NamedOrientation("default", Orientation(), f"ori_{name}")
-    return ActionPoint(name, Position(), parent, id=f"acp_{name}", orientations=[orientation], actions=made)
+    return ActionPoint(name, Position(), parent, id=f"acp_{name}", orientations=[orientation], actions=created)
 
 
 PROJECT = Project(
@@ -134,13 +134,13 @@ class Cell:
 
 @pytest.fixture
 def cell(tmp_path: Path):  # type: ignore[no-untyped-def]
-    made = Cell(tmp_path)
-    yield made
-    for host in made.hosts:
+    created = Cell(tmp_path)
+    yield created
+    for host in created.hosts:
         host.end()
 
 
-def held(host: HostProcess) -> HeldData:
+def wait_until_held(host: HostProcess) -> HeldData:
     found = host.expect(m.ProgramHeld).held
     host.expect_state("paused")
     return found
@@ -169,10 +169,10 @@ def test_a_nest_is_not_filled_twice_by_another_run(cell: Cell) -> None:
     assert inventory.run.results["act_scan"] == ['"A-1"']
 
     host = cell.start(ONE.replace("A-1", "A-2"))
-    found = held(host)
+    found = wait_until_held(host)
     assert (found.kind, found.action_name) == ("place_occupied", "insert")
     assert "nest is occupied: part A-1 is there" in found.text
-    assert cell.notes() == ["pick", "place", "pick"]  # nothing has moved
+    assert cell.notes() == ["pick", "place", "pick"]  # the arm has not moved since
     assert confirm(host, ConfirmedPart(1, "obj_good")) is None
     decide(host, found.number, HoldChoice.RETRY)
     assert host.expect_state("stopped").finished
@@ -183,24 +183,24 @@ def test_a_nest_is_not_filled_twice_by_another_run(cell: Cell) -> None:
 def test_a_failed_movement_is_repeated_or_done_by_hand(cell: Cell) -> None:
     (cell.directory / "fault").touch()
     host = cell.start(ONE + 'arm.test(True, an="test")\narm.pick(inside, an="take")\narm.place(box, an="into_box")')
-    found = held(host)
+    found = wait_until_held(host)
     assert cell.inventory().parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
     changed = [each.inventory for each in host.seen if isinstance(each, m.PartsChanged)]
     assert changed[-1].parts == cell.inventory().parts
     (cell.directory / "sensor").write_text("on")
     decide(host, found.number, HoldChoice.SKIP)  # the part is in the gripper
-    found = held(host)
+    found = wait_until_held(host)
     assert found.action_name == "insert"
     (cell.directory / "sensor").write_text("off")
     decide(host, found.number, HoldChoice.RETRY)
-    found = held(host)
+    found = wait_until_held(host)
     assert (found.kind, found.text) == (
         "place_empty",
         "arm (Arm): The sensor detects no part at arm. Check the place, then confirm where the parts are.",
     )
     (cell.directory / "fault").unlink()
     decide(host, found.number, HoldChoice.SKIP)
-    found = held(host)
+    found = wait_until_held(host)
     assert found.action_name == "into_box"  # the sensor is off although the part was taken
     (cell.directory / "sensor").unlink()
     decide(host, found.number, HoldChoice.RETRY)
@@ -227,7 +227,7 @@ def test_after_kill_the_checkpoint_names_the_running_action(cell: Cell) -> None:
 
 def test_checkpoints_of_actions_can_be_switched_off(cell: Cell) -> None:
     host = cell.start(BODY + 'arm.scan("A-1", an="scan")\narm.pick(box, an="pick")', checkpoints=False)
-    found = held(host)  # parts are not taken from a box
+    found = wait_until_held(host)  # parts are not taken from a box
     assert cell.inventory().parts == []
     decide(host, found.number, HoldChoice.END)
     host.expect_state("stopped")
@@ -237,7 +237,7 @@ def test_checkpoints_of_actions_can_be_switched_off(cell: Cell) -> None:
 def test_a_part_that_is_elsewhere_does_not_count_as_moved(cell: Cell) -> None:
     (cell.directory / "fault").touch()
     host = cell.start(ONE)
-    found = held(host)
+    found = wait_until_held(host)
     assert HoldChoice.SKIP in found.choices
     for where, reason in (("obj_nest", "A-1 is at nest, not at arm"), ("", "skip is not possible here")):
         assert confirm(host, ConfirmedPart(1, where)) is None
@@ -284,11 +284,11 @@ def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell, 
     assert (run.published().continues, run.published().continues_at) == (True, ["pick"])
 
     host = cell.start(body, project, continues=True)
-    found = held(host)
+    found = wait_until_held(host)
     assert (found.kind, found.action_name, found.choices) == (
         "program_interrupted", "pick", [HoldChoice.RETRY, HoldChoice.SKIP, HoldChoice.END]
     )  # fmt: skip
-    assert cell.notes() == ["pick"]  # nothing has moved
+    assert cell.notes() == ["pick"]  # the arm has not moved since
     decide(host, found.number, HoldChoice.RETRY)
     assert host.expect_state("stopped").finished
     assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
@@ -306,9 +306,9 @@ def test_an_interrupted_program_continues_at_a_chosen_action(cell: Cell) -> None
     host.gone()
     (cell.directory / "hang").unlink()
     host = cell.start(STEPS, PROJECT, continues=True, continue_at=0)
-    found = held(host)
+    found = wait_until_held(host)
     assert (found.kind, found.action_name) == ("program_interrupted", "scan")
-    assert cell.notes() == ["pick"]  # nothing has moved
+    assert cell.notes() == ["pick"]  # the arm has not moved since
     decide(host, found.number, HoldChoice.RETRY)
     assert host.expect_state("stopped").finished
     assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
@@ -349,7 +349,7 @@ def test_an_interrupted_program_continues_with_its_variables(cell: Cell) -> None
     assert cell.inventory().run.variables == {"last": '"x"'}  # type: ignore[union-attr]
 
     host = cell.start(COUNTING, WITH_VARIABLE, continues=True)
-    decide(host, held(host).number, HoldChoice.RETRY)
+    decide(host, wait_until_held(host).number, HoldChoice.RETRY)
     scanned = host.expect(
         m.ProgramEvent, lambda event: event.event == "ActionStateAfter" and b"act_scan" in event.encoded
     )

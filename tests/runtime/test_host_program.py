@@ -261,7 +261,7 @@ def test_pause_and_stop_work_between_two_attempts(run: Run) -> None:
     assert run.notes().count("try 2") == 0
 
 
-def test_events_of_a_complete_run(run: Run) -> None:
+def test_a_complete_run_sends_its_events_in_order(run: Run) -> None:
     run.start(
         """
         from object_types.arm import Arm
@@ -443,7 +443,7 @@ def test_pause_between_actions_is_reported_at_once(run: Run) -> None:
     assert run.host.expect_state("stopped").finished
 
 
-def test_start_paused_and_step(run: Run) -> None:
+def test_a_program_starts_paused_and_is_stepped(run: Run) -> None:
     run.start('for name in ("a1", "a2", "a3"): arm.slow(0.0, an=name)', start_paused=True)
     run.host.expect_state("paused")
     assert run.host.events() == ["running", "PackageInfo", "ActionStateBefore", "paused"]
@@ -586,7 +586,7 @@ def test_a_handled_exception_does_not_end_the_program(run: Run) -> None:
         "arm.note('slow')\nfor _ in 1, 2, 3:\n    try: time.sleep(1000)\n    except BaseException: pass",
         "def f(): arm.slow(1000.0, an='a1')\nt = threading.Thread(target=f)\nt.start()\nt.join()",
     ],
-    ids=["action", "sleep", "loop", "lock", "swallows", "swallows all", "thread"],
+    ids=["action", "sleep", "loop", "lock", "catches errors", "catches all", "thread"],
 )
 def test_stop_ends_the_script_in_any_state(run: Run, body: str) -> None:
     run.start(body)
@@ -636,7 +636,7 @@ def test_a_syntax_error_of_the_script_is_reported(run: Run) -> None:
 
 
 # ------------------------------------------------------------------------------------------ control by the client
-def _by_hand(directory: Path, *arguments: str) -> "subprocess.Popen[str]":
+def _run_script(directory: Path, *arguments: str) -> "subprocess.Popen[str]":
     return subprocess.Popen(
         [sys.executable, str(directory / "script.py"), *arguments],
         stdin=subprocess.PIPE,
@@ -648,7 +648,7 @@ def _by_hand(directory: Path, *arguments: str) -> "subprocess.Popen[str]":
 
 def test_a_script_run_by_hand_prints_events_and_reads_commands(run: Run) -> None:
     directory = run.write('arm.slow(0.0, an="a1")\narm.slow(0.0, an="a2")')
-    with _by_hand(directory, "-p") as process:
+    with _run_script(directory, "-p") as process:
         assert process.stdin is not None
         assert process.stdout is not None
         printed = []
@@ -665,9 +665,9 @@ def test_a_script_run_by_hand_prints_events_and_reads_commands(run: Run) -> None
     assert run.notes() == ["control", "slow", "slow", "disconnected"]
 
 
-def test_ctrl_c_stops_a_script_run_by_hand(run: Run) -> None:
+def test_ctrl_c_stops_a_script_run_run_script(run: Run) -> None:
     directory = run.write('arm.slow(1000.0, an="a1")')
-    with _by_hand(directory) as process:
+    with _run_script(directory) as process:
         run.wait_note("slow")
         process.send_signal(signal.SIGINT)
         assert process.wait(WITHIN) == 0

@@ -209,12 +209,12 @@ def test_retry_repeats_the_action_until_it_succeeds(run: Run) -> None:
     assert (held.kind, held.text, held.again) == ("refused", "tool (Tool): the box is full", "ask")
     assert held.choices == ["retry", "skip", "end"]
     assert run.decide(held, HoldChoice.RETRY) is None
-    again = run.held()  # it fails again
-    assert again.number == 2
+    second = run.held()  # the action fails again
+    assert second.number == 2
     assert run.notes() == ["control", "work: refused", "work: refused"]
     assert run.decide(held, HoldChoice.RETRY).code == "conflict", "an outdated number"
     run.clear_fault()
-    assert run.decide(again, HoldChoice.RETRY) is None
+    assert run.decide(second, HoldChoice.RETRY) is None
     assert run.ended().finished
     assert run.notes()[3:] == ["work", "other"]
     started = [e for e in run.host.seen if isinstance(e, m.ProgramEvent) and e.event == "ActionStateBefore"]
@@ -292,7 +292,7 @@ def test_an_error_exit_is_taken_by_decision(run: Run, fault: str) -> None:
     assert "other" in run.notes()
 
 
-def test_exits_of_calls_of_functions_count(run: Run) -> None:
+def test_error_exits_of_function_calls_are_taken(run: Run) -> None:
     body = """
         @res.function
         def inside(*, an: str) -> None:
@@ -380,11 +380,11 @@ def test_without_logic_or_without_the_option_the_program_ends(run: Run) -> None:
 def test_another_branch_waits_at_its_next_action() -> None:
     reports: list[str] = []
     gate = Gate(reports.append)
-    begun, passed = threading.Event(), threading.Event()
+    started, passed = threading.Event(), threading.Event()
     gate.before(Branch())
-    holder = threading.Thread(target=gate.hold_program, args=(Branch(), begun.set))
+    holder = threading.Thread(target=gate.hold_program, args=(Branch(), started.set))
     holder.start()
-    assert begun.wait(20)
+    assert started.wait(20)
 
     def another() -> None:
         gate.before(Branch())
@@ -401,25 +401,25 @@ def test_another_branch_waits_at_its_next_action() -> None:
 
 
 def test_the_program_is_paused_when_the_action_of_another_branch_fails_too() -> None:
-    begun, paused = threading.Event(), threading.Event()
+    started, paused = threading.Event(), threading.Event()
     gate = Gate(lambda state: paused.set() if state == "paused" else None)
     for _ in range(2):
         gate.before(Branch())
-    holders = [threading.Thread(target=gate.hold_program, args=(Branch(), begun.set), daemon=True) for _ in range(2)]
+    holders = [threading.Thread(target=gate.hold_program, args=(Branch(), started.set), daemon=True) for _ in range(2)]
     holders[0].start()
-    assert begun.wait(20)
+    assert started.wait(20)
     assert not paused.is_set(), "the other action still runs"
     holders[1].start()
     assert paused.wait(5)
-    begun.clear()
+    started.clear()
     gate.release()
-    assert begun.wait(20), "the second failure is shown after the first decision"
+    assert started.wait(20), "the second failure is shown after the first decision"
     gate.release()
     for holder in holders:
         holder.join(20)
 
 
-def test_another_hold_begins_before_the_decision_takes_effect() -> None:
+def test_another_hold_starts_before_the_decision_takes_effect() -> None:
     seen: list[str] = []
 
     class OneAtATime(Gate):

@@ -47,8 +47,8 @@ class Arm(UrdfRobot):
         ctypes.PyDLL(None).usleep(self.stall)  # holds the interpreter lock, like a machine that does not run the host
         return self.now
 
-    def follow(self, way: MotionPath) -> None:
-        self.count, self.now = len(way.waypoints), way.waypoints[-1]
+    def follow(self, path: MotionPath) -> None:
+        self.count, self.now = len(path.waypoints), path.waypoints[-1]
 
     def stop(self) -> None:
         super().stop()
@@ -56,7 +56,7 @@ class Arm(UrdfRobot):
     def waypoints(self) -> int:
         return self.count
 
-    def fall_silent(self) -> None:
+    def lose_signal(self) -> None:
         self.silent = True
 
     def stall_host(self) -> None:
@@ -69,9 +69,9 @@ class SlowArm(Arm):
         super().stop()
         self.stopped = True
 
-    def follow(self, way: MotionPath) -> None:
+    def follow(self, path: MotionPath) -> None:
         self.stopped = False
-        goal = way.waypoints[-1]
+        goal = path.waypoints[-1]
         while abs(goal[0].value - self.now[0].value) > 0.01:
             if self.stopped:
                 raise Cancelled(f"a move of {{self.name}} was stopped")
@@ -164,7 +164,7 @@ def test_a_safe_move_avoids_the_current_obstacles(scene: HostProcess) -> None:
 
 def test_a_move_is_refused_if_the_joints_of_another_robot_are_unknown(scene: HostProcess) -> None:
     assert go(scene, ACROSS) is None
-    scene.call("obj_other", "fall_silent")
+    scene.call("obj_other", "lose_signal")
     error = go(scene, READY)
     assert isinstance(error, m.ErrorData)
     assert error.code == "refused"
@@ -196,7 +196,7 @@ def box(key: str, at: Position, x: float, y: float, z: float, **more: Any) -> m.
     return m.AddBody(m.AddedBody(key, object_type.ObjectModel.of(object_type.Box(key, x, y, z)), Pose(at), **more))
 
 
-def collision(answer: Any, *names: str) -> None:
+def assert_collision(answer: Any, *names: str) -> None:
     assert isinstance(answer, m.ErrorData), answer
     assert answer.code == "kinematics"
     for name in names:
@@ -207,7 +207,7 @@ def test_an_added_body_is_an_obstacle_until_it_is_removed(scene: HostProcess, tm
     up, aside = Position(0.0, 0.0, 0.2), Position(0.0, 0.25, 0.0)
     assert line(scene, aside) is None
     scene.send(box("crate", TIP + Position(0.0, 0.25, 0.0), 0.1, 0.1, 0.1))
-    collision(line(scene, aside), "arm/", "crate")
+    assert_collision(line(scene, aside), "arm/", "crate")
     scene.send(box("crate", TIP + Position(0.0, 9.0, 0.0), 0.1, 0.1, 0.1))
     assert line(scene, aside) is None, "it was moved"
 
@@ -215,9 +215,9 @@ def test_an_added_body_is_an_obstacle_until_it_is_removed(scene: HostProcess, tm
     mesh = tmp_path / "mesh"
     mesh.write_bytes(trimesh.creation.box((1.0, 1.0, 1.0)).export(file_type="stl"))
     model = object_type.ObjectModel.of(object_type.Mesh("lump", "lump.stl"))
-    there = Pose(TIP + Position(0.0, 0.25, 0.0))
-    scene.send(m.AddBody(m.AddedBody("lump", model, there, (0.1, 0.1, 0.1), str(mesh))))
-    collision(line(scene, aside), "lump")
+    pose = Pose(TIP + Position(0.0, 0.25, 0.0))
+    scene.send(m.AddBody(m.AddedBody("lump", model, pose, (0.1, 0.1, 0.1), str(mesh))))
+    assert_collision(line(scene, aside), "lump")
     scene.send(m.AddBody(m.AddedBody("lump", model, Pose(TIP + Position(0.0, 0.0, 0.3)), (0.1, 0.1, 0.1), str(mesh))))
     assert line(scene, aside) is None
     scene.send(m.RemoveBodies(["lump"]))
@@ -284,7 +284,7 @@ def test_a_held_body_collides_where_the_arm_does_not(scene: HostProcess) -> None
     assert line(scene, aside) is None
     rod = Position(0.0, 0.0, 0.16)
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="tcp"))
-    collision(line(scene, aside), "rod", "table")
+    assert_collision(line(scene, aside), "rod", "table")
     assert line(scene, Position(0.0, -0.1, 0.0)) is None, "it is not an obstacle for the robot that holds it"
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="claw"))
     error = line(scene, aside)
@@ -293,10 +293,10 @@ def test_a_held_body_collides_where_the_arm_does_not(scene: HostProcess) -> None
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_of_another_scene", link="tcp"))
     assert line(scene, aside) is None
     scene.send(box("rod", TIP + aside, 0.03, 0.03, 0.3))
-    collision(line(scene, aside), "rod")
+    assert_collision(line(scene, aside), "rod")
 
 
-def held(host: HostProcess) -> list[tuple[str, str]]:
+def held_parts(host: HostProcess) -> list[tuple[str, str]]:
     """Return names and links of the held parts in the last report of the host."""
     reported = [each for each in host.seen if isinstance(each, m.DeviceChanged) and each.object_id == "obj_arm"]
     return [(part.name, part.link) for part in reported[-1].held]
@@ -322,10 +322,10 @@ def test_a_gripped_part_collides_where_the_arm_does_not(host: HostProcess, alone
     assert line(host, aside) is None
     assert go(host, READY) is None
     assert host.call("obj_claw", "grip", width=0.0, force=1.0, speed=1.0)[0]
-    assert held(host) == [("part of claw", "tcp")]
-    collision(line(host, aside), "part of claw", "table")
+    assert held_parts(host) == [("part of claw", "tcp")]
+    assert_collision(line(host, aside), "part of claw", "table")
     assert host.call("obj_claw", "release") is None
-    assert held(host) == []
+    assert held_parts(host) == []
     assert line(host, aside) is None
 
 
@@ -339,20 +339,20 @@ def test_another_arm_is_an_obstacle_at_its_current_joints(host: HostProcess) -> 
     assert host.call("obj_other", "move_to_joints", target_joints=reaching, speed=0.5, safe=False) is None
     assert go(host, READY) is None
     assert host.call("obj_arm", "waypoints") > 2
-    collision(go(host, MEETING), "arm/", "other/")
+    assert_collision(go(host, MEETING), "arm/", "other/")
     # In the opposite direction, too: neither robot moves into the other.
     assert go(host, MEETING, safe=False) is None
     home = joints(READY)
     assert host.call("obj_other", "move_to_joints", target_joints=home, speed=0.5, safe=False) is None
     answer = host.call("obj_other", "move_to_joints", target_joints=reaching, speed=0.5)
-    collision(answer, "arm/", "other/")
+    assert_collision(answer, "arm/", "other/")
     # The gripped part counts as part of the robot.
     assert go(host, READY, safe=False) is None
     assert host.call("obj_other", "move_to_joints", target_joints=joints((1.57, *READY[1:])), speed=0.5) is None
     assert go(host, ACROSS) is None
     assert host.call("obj_arm", "waypoints") == 2
     host.send(box("beam", Position(0.27, 0.5, 0.0), 0.1, 1.0, 0.1, robot="obj_other", link="tcp"))
-    collision(go(host, MEETING), "arm/", "beam")
+    assert_collision(go(host, MEETING), "arm/", "beam")
 
 
 PAIR = """
@@ -381,7 +381,7 @@ class Pair(MultiArmRobot):
     def suctions(self, arm_id: str | None = None) -> set[str]:
         return set()
 
-    def tell(self, count: int) -> None:
+    def set_joint_count(self, count: int) -> None:
         self.joint_count = count
 """.replace("START", repr(list(zip(NAMES, (-1.57, *READY[1:]), strict=True))))
 
@@ -390,8 +390,8 @@ def test_a_robot_with_several_arms_is_an_obstacle_if_all_joints_are_known(host: 
     objects = [placed("arm", "Arm", Pose()), placed("pair", "Pair", Pose(Position(0.0, 1.0, 0.0)))]
     host.send(open_scene([type_code("Arm", ARM), type_code("Pair", PAIR)], *objects, assets={"arm.urdf": str(URDF)}))
     host.expect(m.SceneOpened)
-    collision(go(host, MEETING), "arm/", "pair/")
-    host.call("obj_pair", "tell", count=3)
+    assert_collision(go(host, MEETING), "arm/", "pair/")
+    host.call("obj_pair", "set_joint_count", count=3)
     error = go(host, MEETING)
     assert isinstance(error, m.ErrorData)
     assert error.code == "refused"

@@ -340,10 +340,10 @@ def test_prints_and_warnings_of_drivers_do_not_break_the_host(host: HostProcess)
 
 def test_a_call_that_blocks_the_interpreter_does_not_end_the_host(host: HostProcess) -> None:
     _open(host, "a")
-    began = time.monotonic()
+    start = time.monotonic()
     host.begin("obj_a", "freeze")
     assert host.call("obj_a", "quick") == "quick"
-    assert time.monotonic() - began > 1.5
+    assert time.monotonic() - start > 1.5
 
 
 def test_the_end_of_the_host_is_detected(host: HostProcess) -> None:
@@ -363,7 +363,7 @@ class Reaching(Generic):
 
     def connect(self, timeout: float = 5.0) -> None:
         until = time.monotonic() + timeout
-        while True:  # all come up at once
+        while True:  # all devices connect concurrently
             try:
                 self.other = self.find("b")
                 return

@@ -49,14 +49,14 @@ class Tokens(RuleBasedStateMachine):
     def begin(self, robot: str, zones: set[str]) -> None:
         if robot not in self.wants:
             self.wants[robot] = zones | self.inside[robot]
-            self.ask(robot)
+            self.request(robot)
 
     @rule(robot=strategies.sampled_from(ROBOTS))
     def ask_again(self, robot: str) -> None:
         if robot in self.wants:
-            self.ask(robot)
+            self.request(robot)
 
-    def ask(self, robot: str) -> None:
+    def request(self, robot: str) -> None:
         busy = self.tokens.take(robot, self.wants[robot])
         if busy is None:
             self.inside[robot] = self.wants.pop(robot)
@@ -65,10 +65,10 @@ class Tokens(RuleBasedStateMachine):
             assert busy.owner != robot
             assert self.tokens.owner(busy.zone) == busy.owner
             if busy.deadlock:
-                self.give_up(robot)
+                self.cancel(robot)
 
     @rule(robot=strategies.sampled_from(ROBOTS))
-    def give_up(self, robot: str) -> None:
+    def cancel(self, robot: str) -> None:
         self.wants.pop(robot, None)
         self.tokens.release(robot, keep=self.inside[robot])
         assert self.tokens.owned(robot) == self.inside[robot]
@@ -86,7 +86,7 @@ class Tokens(RuleBasedStateMachine):
             assert sum(zone in inside for inside in self.inside.values()) <= 1
 
     @invariant()
-    def somebody_can_continue(self) -> None:
+    def a_robot_can_continue(self) -> None:
         """Of the robots that wait, at least one waits for a robot that does not wait: deadlocks were detected."""
         if self.wants:
             waited_for = {self.tokens.take(robot, zones) for robot, zones in self.wants.items()}
@@ -223,7 +223,7 @@ TYPES: Final = {"Door": DOOR, "Arm": ARM, "Zone": BODY}
 
 
 class Cell:
-    """A door, a zone around x = 1 m, and arms that move along x. Their joint log states who is in the zone."""
+    """A door, a zone around x = 1 m, and arms that move along x. Their joint log shows which arm is in the zone."""
 
     def __init__(self, host: HostProcess, package: Package, directory: Path) -> None:
         self.host, self.package, self.directory = host, package, directory
@@ -400,7 +400,7 @@ def hold(cell: Cell, number: int, velocity: float = 0.0) -> Any:
     raise AssertionError("the robot moves on")
 
 
-def test_a_robot_leaves_a_zone_that_it_may_not_have(cell: Cell) -> None:
+def test_a_robot_leaves_a_zone_that_it_may_not_enter(cell: Cell) -> None:
     cell.objects[1] = cell.arm("arm", x=0.85)
     # The nearest surface is at x = 1.2; the path leads through the door at x = 0.8.
     cell.open(replace(ENTER, otherwise=Unmet.HOLD, retract=[Position(0.0), Position(-0.25)]))
@@ -410,9 +410,9 @@ def test_a_robot_leaves_a_zone_that_it_may_not_have(cell: Cell) -> None:
     deeper = hold(cell, 1, velocity=0.25)
     assert deeper.code == "interlock"
     assert "not deeper" in str(deeper.message)
-    began = time.monotonic()
+    start = time.monotonic()
     assert str(hold(cell, 2).message) == "arm has left the zone."
-    assert time.monotonic() - began > 1.5, "it is slow"
+    assert time.monotonic() - start > 1.5, "the robot leaves the zone slowly"
     assert cell.log()[1:] == ["arm leaves"]
     where = cell.host.call("obj_arm", "get_end_effector_pose", end_effector="tool")
     assert 0.73 < where["position"]["x"] < 0.8
@@ -463,8 +463,8 @@ def test_two_robots_never_share_a_zone(cell: Cell) -> None:
     inside: set[str] = set()
     entries: dict[str, int] = {}
     for line in cell.log()[1:]:
-        name, what = line.split()
-        if what == "enters":
+        name, event = line.split()
+        if event == "enters":
             inside.add(name)
             entries[name] = entries.get(name, 0) + 1
         else:

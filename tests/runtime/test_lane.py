@@ -73,18 +73,18 @@ def test_a_queued_call_that_expired_never_runs(lane: Lane) -> None:
 
 
 def test_a_stop_cancels_queued_and_running_calls(lane: Lane) -> None:
-    gate, begun = threading.Event(), threading.Event()
+    gate, started = threading.Event(), threading.Event()
     ran: list[int] = []
 
     def move() -> str:
-        begun.set()
+        started.set()
         gate.wait(WITHIN)
         return "arrived"
 
     moving, waiting = Job("move", move), Job("wait", lambda: ran.append(1))
     for job in (moving, waiting):
         lane.submit(job)
-    assert begun.wait(WITHIN)
+    assert started.wait(WITHIN)
     assert lane.interrupt() is moving
     assert waiting.wait(WITHIN)
     gate.set()
@@ -96,16 +96,16 @@ def test_a_stop_cancels_queued_and_running_calls(lane: Lane) -> None:
 
 
 def test_a_stopped_call_keeps_the_error_of_the_device(lane: Lane) -> None:
-    begun, gate = threading.Event(), threading.Event()
+    started, gate = threading.Event(), threading.Event()
 
     def move() -> None:
-        begun.set()
+        started.set()
         gate.wait(WITHIN)
         raise DeviceFault("drive 3")
 
     job = Job("move", move)
     lane.submit(job)
-    begun.wait(WITHIN)
+    started.wait(WITHIN)
     lane.interrupt()
     gate.set()
     assert job.wait(WITHIN)
@@ -162,11 +162,11 @@ def test_a_call_ends_exactly_once() -> None:
 
 def test_a_driver_can_check_whether_its_call_is_still_wanted(lane: Lane) -> None:
     lane.check_wanted()  # outside of a call there is nothing to check
-    begun, gate = threading.Event(), threading.Event()
+    started, gate = threading.Event(), threading.Event()
 
     def act(*, wait: bool) -> str:
         if wait:
-            begun.set()
+            started.set()
             gate.wait(WITHIN)
         lane.check_wanted()
         return "acted"
@@ -175,7 +175,7 @@ def test_a_driver_can_check_whether_its_call_is_still_wanted(lane: Lane) -> None
 
     stopped = Job("act", act, keywords={"wait": True})
     lane.submit(stopped)
-    assert begun.wait(WITHIN)
+    assert started.wait(WITHIN)
     lane.interrupt()
     gate.set()
     assert stopped.wait(WITHIN)
@@ -211,7 +211,7 @@ def test_the_running_method_is_known(lane: Lane) -> None:
     assert lane.current is None
 
 
-def test_calls_behind_a_hung_one_fail_at_once_and_say_since_when_it_hangs(lane: Lane) -> None:
+def test_calls_behind_a_hung_one_fail_at_once_and_state_since_when_it_hangs(lane: Lane) -> None:
     gate = threading.Event()
     hanging, waiting = Job("slow", gate.wait), Job("next", lambda: 1)
     lane.submit(hanging)
@@ -282,17 +282,17 @@ def test_a_stop_after_closing_does_not_keep_the_thread_alive() -> None:
 def test_a_stopped_call_names_the_error_that_the_driver_raised(
     lane: Lane, error: Exception | None, detail: str
 ) -> None:
-    begun, gate = threading.Event(), threading.Event()
+    started, gate = threading.Event(), threading.Event()
 
     def act() -> None:
-        begun.set()
+        started.set()
         gate.wait(WITHIN)
         if error is not None:
             raise error
 
     job = Job("act", act)
     lane.submit(job)
-    assert begun.wait(WITHIN)
+    assert started.wait(WITHIN)
     lane.interrupt()
     gate.set()
     assert job.wait(WITHIN)

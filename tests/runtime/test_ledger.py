@@ -1,4 +1,4 @@
-"""Part inventory, and their checkpoints on disk."""
+"""The inventory of parts, and its checkpoints on disk."""
 
 import itertools
 import random
@@ -24,13 +24,13 @@ PLACES = [
 
 @pytest.fixture
 def ledger() -> Ledger:
-    made = Ledger(PartInventory("scn_1"))
-    made.set_places(PLACES)
-    return made
+    ledger = Ledger(PartInventory("scn_1"))
+    ledger.set_places(PLACES)
+    return ledger
 
 
-def carry(ledger: Ledger, *way: str) -> None:
-    for source, target in itertools.pairwise(way):
+def carry(ledger: Ledger, *places: str) -> None:
+    for source, target in itertools.pairwise(places):
         ledger.complete(ledger.move(source, target))
 
 
@@ -128,7 +128,7 @@ def test_the_inventory_balances_after_random_operations(ledger: Ledger) -> None:
     assert ledger.inventory.counts.good, seed
 
 
-def test_a_part_that_a_sensor_has_invented_does_not_count(ledger: Ledger) -> None:
+def test_a_part_that_a_sensor_has_reported_falsely_does_not_count(ledger: Ledger) -> None:
     carry(ledger, "stop", "robot")
     number = ledger.move("stop", "nest")
     ledger.fail(number)
@@ -155,20 +155,20 @@ def test_effects_that_ended_with_the_program_are_repeated() -> None:
     assert (moved.why_not(), moved.published().continues) == ("pick", False)
 
 
-def test_a_power_cut_leaves_the_checkpoint_before(tmp_path: Path) -> None:
+def test_a_power_cut_leaves_the_previous_checkpoint(tmp_path: Path) -> None:
     file = CheckpointFile(tmp_path, "scn/1")
     assert file.read() is None
     for number in range(4):
         file.write(PartInventory(f"{number}"))
     newest = max(tmp_path.iterdir(), key=lambda path: path.read_bytes()[0])
-    whole = newest.read_bytes()
-    for damaged in (whole[:-1], whole[:10], b"", whole[:-1] + bytes([whole[-1] ^ 1])):
+    intact = newest.read_bytes()
+    for damaged in (intact[:-1], intact[:10], b"", intact[:-1] + bytes([intact[-1] ^ 1])):
         newest.write_bytes(damaged)
         found = CheckpointFile(tmp_path, "scn/1").read()
         assert found is not None
         assert found.scene_id == "2"
-    again = CheckpointFile(tmp_path, "scn/1")
-    again.write(PartInventory("5"))
+    reopened = CheckpointFile(tmp_path, "scn/1")
+    reopened.write(PartInventory("5"))
     found = CheckpointFile(tmp_path, "scn/1").read()
     assert found is not None
     assert found.scene_id == "5"

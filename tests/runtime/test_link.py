@@ -6,7 +6,7 @@ from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.link import Link
 
 
-def test_messages_end_when_a_sender_that_was_alive_falls_silent() -> None:
+def test_messages_end_when_an_alive_sender_stops_sending() -> None:
     ours, theirs = socket.socketpair()
     wake, waker = socket.socketpair()
     with ours, theirs, wake, waker:

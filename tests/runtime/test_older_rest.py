@@ -112,7 +112,7 @@ def test_requests_are_camel_case_and_results_snake_case(service: Service, url: s
     assert sent["whereTo"]["position"] == {"x": 1, "y": 2, "z": 3}
 
 
-def test_results_as_lists_scalars_bytes_and_classes(service: Service, url: str) -> None:
+def test_results_are_converted_to_lists_scalars_bytes_and_classes(service: Service, url: str) -> None:
     service.content = b"[1, 2.5]"
     assert rest.call(rest.Method.GET, url, list_return_type=float) == [1.0, 2.5]
     assert rest.call(rest.Method.GET, url, return_type=bytes) == b"[1, 2.5]"
@@ -170,7 +170,7 @@ def test_a_silent_service_times_out(service: Service, url: str) -> None:
         rest.call(rest.Method.GET, "nowhere")
 
 
-def test_json_functions() -> None:
+def test_json_functions_convert_and_refuse() -> None:
     assert older_json.loads('{"a": [1, 2.0, null]}') == {"a": [1, 2.0, None]}
     assert older_json.loads_type("1", int) == 1
     assert json.loads(older_json.dumps({"pose": Pose(), "kind": Kind.FAST}))["kind"] == "fast"

@@ -37,8 +37,8 @@ class ArmService(ThreadingHTTPServer):
         self.started = False
         self.url = f"http://127.0.0.1:{self.server_address[1]}"
 
-    def of(self, what: str) -> list[tuple[str, Any]]:
-        return [(path, body) for method, path, body in self.requests if f"{method} {path}".startswith(what)]
+    def received(self, prefix: str) -> list[tuple[str, Any]]:
+        return [(path, body) for method, path, body in self.requests if f"{method} {path}".startswith(prefix)]
 
 
 class ArmHandler(BaseHTTPRequestHandler):
@@ -228,13 +228,13 @@ class Odd(Generic):
 
 
 # ---------------------------------------------------------------------------------------------- scene
-def test_an_older_robot_behind_a_rest_service(host: HostProcess, arm_service: ArmService) -> None:
+def test_an_older_robot_behind_a_rest_service_works_in_a_scene(host: HostProcess, arm_service: ArmService) -> None:
     arm = SceneObject(
         "arm", "ArmM1", Pose(Position(10, 0, 0)), scene_object("arm", "x", url=arm_service.url).parameters, "obj_arm"
     )
     host.send(open_scene(codes("KinematicsMixin", "AbstractArm", "ArmM1"), arm))
     host.expect(m.SceneOpened)
-    ((_, start),) = arm_service.of("PUT /state/start")
+    ((_, start),) = arm_service.received("PUT /state/start")
     assert start["position"]["x"] == 10
     assert host.call("obj_arm", "get_end_effector_pose", end_effector="default")["position"] == {
         "x": 11,
@@ -244,13 +244,13 @@ def test_an_older_robot_behind_a_rest_service(host: HostProcess, arm_service: Ar
     assert host.call("obj_arm", "robot_joints") == [{"name": "j1", "value": 0.5}, {"name": "j2", "value": 1}]
     target = {"position": {"x": 12, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
     assert host.call("obj_arm", "move", pose=target, move_type="LINEAR") is None
-    ((path, body),) = arm_service.of("PUT /eef/pose")
+    ((path, body),) = arm_service.received("PUT /eef/pose")
     assert path == "/eef/pose?moveType=LINEAR&velocity=50.0&safe=true"
     assert body["position"] == {"x": 2, "y": 0, "z": 0}
     near = {"position": {"x": 1, "y": 0, "z": 0}, "orientation": target["orientation"]}
     found = host.call("obj_arm", "inverse_kinematics", end_effector_id="default", pose=near)
     assert found == [{"name": "j1", "value": 0.5}]
-    ((_, body),) = arm_service.of("PUT /ik")
+    ((_, body),) = arm_service.received("PUT /ik")
     assert set(body) == {"pose", "avoidCollisions"}
     refused = host.call("obj_arm", "inverse_kinematics", end_effector_id="default", pose=target)
     assert (refused.code, refused.type) == ("rest_refused", "RestHttpException")
@@ -262,7 +262,7 @@ def test_an_older_robot_behind_a_rest_service(host: HostProcess, arm_service: Ar
     assert any("arm started" in line for line in lines)
     host.send(m.CloseScene())
     assert host.expect(m.SceneClosed).error is None
-    assert arm_service.of("PUT")[-1][0] == "/state/stop"
+    assert arm_service.received("PUT")[-1][0] == "/state/stop"
 
 
 def test_the_error_of_a_constructor_is_reported(host: HostProcess, arm_service: ArmService) -> None:
@@ -282,7 +282,7 @@ def test_an_unreachable_service_is_named(host: HostProcess) -> None:
     assert (error.code, "GET http://127.0.0.1:1/state/started" in error.message.text) == ("rest", True)
 
 
-def test_an_older_machine_with_settings_dynamic_values_and_cancel(
+def test_an_older_machine_supports_settings_dynamic_values_and_cancel(
     host: HostProcess, bench_service: BenchService
 ) -> None:
     bench = scene_object("bench", "TestBench", port=bench_service.server_address[1], level=2)
@@ -301,7 +301,7 @@ def test_an_older_machine_with_settings_dynamic_values_and_cancel(
     assert bench_service.left.wait(30)
 
 
-def test_an_older_camera_and_collision_object(host: HostProcess) -> None:
+def test_an_older_camera_and_collision_object_work_in_a_scene(host: HostProcess) -> None:
     crate = scene_object("crate", "Crate", pose=True)
     models = {"Crate": ObjectModel.of(Box("Crate", 0.1, 0.2, 0.5))}
     camera = scene_object("camera", "ShopCamera", pose=True)
@@ -348,8 +348,8 @@ def test_a_package_built_by_arcor2_runs(
     assert exception["type"] == "BenchException"
     assert exception["handled"] is True
     assert "no such program" in exception["message"]
-    assert [body["position"] for _, body in arm_service.of("PUT /eef/pose")] == [{"x": 1, "y": 2, "z": 3}] * 2
-    assert arm_service.of("PUT")[-1][0] == "/state/stop"
+    assert [body["position"] for _, body in arm_service.received("PUT /eef/pose")] == [{"x": 1, "y": 2, "z": 3}] * 2
+    assert arm_service.received("PUT")[-1][0] == "/state/stop"
     assert bench_service.left.wait(30)
 
 

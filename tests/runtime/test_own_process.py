@@ -1,4 +1,4 @@
-"""Object types whose instances run in their own process."""
+"""Object types whose instances run in a separate process."""
 
 import contextlib
 import os
@@ -33,7 +33,7 @@ class Part:
     weights: tuple[float, ...]
 
 class Jam(DeviceFault):
-    '''A jam, of an object type's own.'''
+    '''An error class of an object type.'''
 
     code = "jam"
 
@@ -90,7 +90,7 @@ class Plain(GenericWithPose):
         return until
 
 class Worker(Plain):
-    '''Runs in a process of its own.'''
+    '''Runs in a separate process.'''
 
     own_process = True
     CANCEL_MAPPING = {"spin": "stop"}
@@ -118,14 +118,14 @@ class Worker(Plain):
         frame = Frame(np.full((4, 6, 3), 7, np.uint8), None, note, 1.5)
         return {"part": Part(Colour.RED, (1.0, 2.0)), "frame": frame, "pose": self.pose, "me": self}
 
-    def fail(self, how: str) -> None:
-        if how == "jam":
+    def fail(self, kind: str) -> None:
+        if kind == "jam":
             raise Jam("the gate", depth=2.5)
-        if how == "kinematics":
+        if kind == "kinematics":
             raise Robot.KinematicsException("no joints for the pose", "q1")
-        if how == "odd":
+        if kind == "odd":
             raise UnicodeDecodeError("utf-8", b"x", 0, 1, "odd")
-        if how == "value":
+        if kind == "value":
             return (number for number in range(3))
         raise Refused("in this state", "S3")
 
@@ -151,7 +151,7 @@ def notes(tmp_path: Path) -> Path:
 
 
 def _open(host: HostProcess, notes: Path, *names: str, **settings: object) -> None:
-    """Open a scene. Objects whose names start with w run in their own process."""
+    """Open a scene. Objects whose names start with w run in a separate process."""
     objects = [
         scene_object(name, "Worker" if name.startswith("w") else "Plain", pose=True, file=str(notes), **settings)
         for name in names
@@ -176,7 +176,7 @@ def _ended(pid: int) -> bool:
         return True
 
 
-def _wait_noted(notes: Path, text: str) -> None:
+def _wait_for_note(notes: Path, text: str) -> None:
     _wait(lambda: notes.exists() and text in notes.read_text())
 
 
@@ -188,7 +188,7 @@ def _kept_interpreter(
     fifo = directory / "fifo"
     os.mkfifo(fifo)
     call = host.begin(caller, method, fifo=str(fifo))
-    _wait_noted(notes, "w1 keeping")
+    _wait_for_note(notes, "w1 keeping")
     try:
         yield call
     finally:
@@ -214,8 +214,8 @@ def test_a_type_that_blocks_the_interpreter_does_not_delay_other_devices(
 ) -> None:
     _open(host, notes, "w1", "w2", "p")
     moves = [host.begin(f"obj_{name}", "move") for name in ("w2", "p")]
-    _wait_noted(notes, "w2 moving")
-    _wait_noted(notes, "p moving")
+    _wait_for_note(notes, "w2 moving")
+    _wait_for_note(notes, "p moving")
     with _kept_interpreter(host, notes, tmp_path) as kept:
         # Each call is answered although w1 cannot run any code, because its C call ends only after this block.
         host.send(m.StopMotion(98, "obj_w2"))
@@ -231,7 +231,7 @@ def test_a_stop_interrupts_an_action_that_computes(host: HostProcess, notes: Pat
     _open(host, notes, "w1")
     spin = host.begin("obj_w1", "spin", file=str(tmp_path / "never"))
     queued = host.begin("obj_w1", "pid")
-    _wait_noted(notes, "spinning")
+    _wait_for_note(notes, "spinning")
     host.send(m.StopMotion(99, "obj_w1"))
     assert host.answer(queued).code == "cancelled"
     assert host.answer(99) is None
@@ -254,7 +254,7 @@ def test_a_stop_cancels_a_call_that_has_not_started(host: HostProcess, notes: Pa
 
 
 @pytest.mark.parametrize(
-    ("how", "code", "text", "detail"),
+    ("kind", "code", "text", "detail"),
     [
         ("jam", "jam", "jammed at the gate", "2.5 mm"),
         ("kinematics", "kinematics", "no joints for the pose", "q1"),
@@ -263,9 +263,9 @@ def test_a_stop_cancels_a_call_that_has_not_started(host: HostProcess, notes: Pa
         ("value", "invalid_data", "generator", ""),
     ],
 )
-def test_errors_keep_their_class(host: HostProcess, notes: Path, how: str, code: str, text: str, detail: str) -> None:
+def test_errors_keep_their_class(host: HostProcess, notes: Path, kind: str, code: str, text: str, detail: str) -> None:
     _open(host, notes, "w1")
-    error = host.call("obj_w1", "fail", how=how)
+    error = host.call("obj_w1", "fail", kind=kind)
     assert (error.code, error.detail, error.object_id) == (code, detail, "obj_w1")
     assert text in error.message.text
     assert "w1" in error.message.text
@@ -281,7 +281,7 @@ def test_object_references_work_across_processes(host: HostProcess, notes: Path)
 def test_a_process_that_is_killed_is_reported_and_can_be_retried(host: HostProcess, notes: Path) -> None:
     _open(host, notes, "w1", "w2", "p")
     move = host.begin("obj_w1", "move")
-    _wait_noted(notes, "w1 moving")
+    _wait_for_note(notes, "w1 moving")
     child = next(one for one in psutil.Process(host.process.pid).children() if one.pid != host.call("obj_w2", "pid"))
     child.kill()
     lost = host.answer(move)
@@ -292,8 +292,8 @@ def test_a_process_that_is_killed_is_reported_and_can_be_retried(host: HostProce
     assert changed[0].object_id == "obj_w1"
     assert changed[0].reason is not None
     assert changed[0].reason.key == "{name}: the process of the device was killed by {signal}"
-    again = host.call("obj_w1", "pid")
-    assert again.code == "not_connected"
+    refused = host.call("obj_w1", "pid")
+    assert refused.code == "not_connected"
     assert host.call("obj_p", "pid") == host.process.pid
     assert isinstance(host.call("obj_w2", "pid"), int)
     host.send(m.RetryObject(70, "obj_w1"))
@@ -321,7 +321,7 @@ def test_the_process_ends_with_the_cell_host(host: HostProcess, notes: Path, han
     _open(host, notes, "w1", fail="hangs" if hangs else "")
     pid = host.call("obj_w1", "pid")
     host.begin("obj_w1", "move")
-    _wait_noted(notes, "w1 moving")
+    _wait_for_note(notes, "w1 moving")
     os.kill(host.process.pid, signal.SIGKILL)
     _wait(lambda: _ended(pid))  # also if disconnecting never returns
     assert "w1 stop" in notes.read_text()
@@ -332,7 +332,7 @@ def test_the_end_of_the_server_stops_and_disconnects_the_device(host: HostProces
     _open(host, notes, "w1")
     pid = host.call("obj_w1", "pid")
     host.begin("obj_w1", "move")
-    _wait_noted(notes, "w1 moving")
+    _wait_for_note(notes, "w1 moving")
     host.socket.close()
     assert host.gone() == 0
     _wait(lambda: _ended(pid))

@@ -18,7 +18,7 @@ AT: Final = Pose(Position(1.0, 2.0, 0.0), QUARTER)
 BOX: Final = Box("zone", 0.4, 1.0, 2.0)
 
 
-def near(found: Position | None, *expected: float) -> bool:
+def is_near(found: Position | None, *expected: float) -> bool:
     return found is not None and found.distance_to(Position(*expected)) < 1e-9
 
 
@@ -35,17 +35,17 @@ def near(found: Position | None, *expected: float) -> bool:
 def test_the_shortest_path_leads_to_the_nearest_surface(
     model: Models, tip: Position, direction: tuple[float, float, float], depth: float
 ) -> None:
-    way = Retreat(Obstacle("zone", model, AT), [])
-    assert near(way.direction(tip), *direction)
-    assert way.remaining([tip]) == pytest.approx(depth)
+    retreat = Retreat(Obstacle("zone", model, AT), [])
+    assert is_near(retreat.direction(tip), *direction)
+    assert retreat.remaining([tip]) == pytest.approx(depth)
 
 
 def test_a_path_leads_around_the_corner() -> None:
-    way = Retreat(Obstacle("zone", BOX, AT), [Position(), Position(0.0, 0.4), Position(0.5, 0.4)])
-    assert near(way.direction(Position(1.0, 2.0, 0.0)), -1.0, 0.0, 0.0)
-    assert way.remaining([Position(1.0, 2.0, 0.0)]) == pytest.approx(0.9)
-    assert near(way.direction(Position(0.6, 2.0, 0.0)), 0.0, 1.0, 0.0)
-    assert way.direction(Position(0.6, 2.499, 0.0)) is None
+    retreat = Retreat(Obstacle("zone", BOX, AT), [Position(), Position(0.0, 0.4), Position(0.5, 0.4)])
+    assert is_near(retreat.direction(Position(1.0, 2.0, 0.0)), -1.0, 0.0, 0.0)
+    assert retreat.remaining([Position(1.0, 2.0, 0.0)]) == pytest.approx(0.9)
+    assert is_near(retreat.direction(Position(0.6, 2.0, 0.0)), 0.0, 1.0, 0.0)
+    assert retreat.direction(Position(0.6, 2.499, 0.0)) is None
 
 
 def test_only_paths_that_end_outside_are_accepted() -> None:

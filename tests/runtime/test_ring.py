@@ -26,7 +26,7 @@ def thing(name: str) -> Any:
     return SimpleNamespace(id=f"obj_{name}", name=name)
 
 
-class Time:
+class Clock:
     """The monotonic clock, set by the test."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -35,8 +35,8 @@ class Time:
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Time:
-    return Time(monkeypatch)
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    return Clock(monkeypatch)
 
 
 def content(ring: Ring) -> list[bytes]:
@@ -87,7 +87,7 @@ def test_a_second_mapping_of_the_memory_reads_records_during_writing() -> None:
         thread.join()
 
 
-def test_hosts_may_use_the_same_numbers(clock: Time) -> None:
+def test_hosts_may_use_the_same_action_numbers(clock: Clock) -> None:
     """The main host runs a program; users call a device of each host."""
     hosts = [Recorder(Ring(), lambda: Cell()), Recorder(Ring(), lambda: Cell())]
     for name, recorder in zip(("near", "far"), hosts, strict=True):
@@ -105,7 +105,7 @@ def test_hosts_may_use_the_same_numbers(clock: Time) -> None:
     assert next(each.number for each in found.actions if each.name == "pick") == 1
 
 
-def test_values_joints_and_actions_become_columns(clock: Time) -> None:
+def test_values_joints_and_actions_become_columns(clock: Clock) -> None:
     ring = Ring()
     recorder = Recorder(ring)
     robot, io = thing("robot"), thing("io")
@@ -144,7 +144,7 @@ def test_values_joints_and_actions_become_columns(clock: Time) -> None:
     assert (wait.begin, wait.end) == (-1000, UNSET)
 
 
-def test_values_that_have_not_changed_for_long_are_known_and_older_changes_are_cut(clock: Time) -> None:
+def test_values_that_have_not_changed_for_long_are_known_and_older_changes_are_cut(clock: Clock) -> None:
     ring = Ring()
     recorder = Recorder(ring)
     still, moving = thing("still"), thing("moving")
@@ -162,7 +162,7 @@ def test_values_that_have_not_changed_for_long_are_known_and_older_changes_are_c
     assert [action.name for action in found.actions] == ["long"]
 
 
-def test_more_values_than_fit_shorten_the_recorded_time(clock: Time) -> None:
+def test_more_values_than_fit_shorten_the_recorded_time(clock: Clock) -> None:
     ring = Ring()
     recorder = Recorder(ring)
     source = thing("noisy")
@@ -176,7 +176,7 @@ def test_more_values_than_fit_shorten_the_recorded_time(clock: Time) -> None:
     assert all(each.values[-1] == 5999.5 for each in found.signals)
 
 
-def test_a_damaged_record_hides_no_other(clock: Time) -> None:
+def test_a_damaged_record_hides_no_other(clock: Clock) -> None:
     ring = Ring()
     recorder = Recorder(ring)
     recorder.observed(thing("a"), [Observation("x", 1.0)], clock.now)
@@ -186,7 +186,7 @@ def test_a_damaged_record_hides_no_other(clock: Time) -> None:
     assert [(each.name, each.values) for each in found.signals] == [("x", [1.0]), ("y", [None])]
 
 
-def test_shown_values_that_are_observations_are_recorded_once(clock: Time) -> None:
+def test_shown_values_that_are_observations_are_recorded_once(clock: Clock) -> None:
     ring = Ring()
     recorder = Recorder(ring)
     recorder.observed(thing("belt"), [Observation("Velocity", 0.1, "m/s")], clock.now)
@@ -200,7 +200,7 @@ def test_shown_values_that_are_observations_are_recorded_once(clock: Time) -> No
     ]
 
 
-def test_a_new_state_is_converted_once_and_only_if_it_differs(clock: Time) -> None:
+def test_a_new_state_is_converted_once_and_only_if_it_differs(clock: Clock) -> None:
     ring = Ring()
     jobs: list[Any] = []
     instance = SimpleNamespace(id="obj_io", name="io", observations=lambda: [Observation("part", True)])
