@@ -42,10 +42,10 @@ class PlainArm(UrdfRobot):
         gripper = [Joint("finger", 0.01)] if include_gripper else []
         return [*self.now, *gripper]
 
-    def follow(self, way: MotionPath) -> None:
+    def follow(self, path: MotionPath) -> None:
         """Go from waypoint to waypoint."""
-        self.ways.append(way)
-        for waypoint in way.waypoints[1:]:
+        self.paths.append(path)
+        for waypoint in path.waypoints[1:]:
             self.now = waypoint
 
     def stop(self) -> None:
@@ -98,20 +98,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 @pytest.fixture
-def around() -> FixedSurroundings:
+def surroundings() -> FixedSurroundings:
     return FixedSurroundings()
 
 
 @pytest.fixture
-def arm(folder: Path, around: FixedSurroundings) -> Any:
-    return made(folder, around, "plain")
+def arm(folder: Path, surroundings: FixedSurroundings) -> Any:
+    return new_arm(folder, surroundings, "plain")
 
 
-def made(folder: Path, around: FixedSurroundings, name: str, pose: Pose = BASE) -> Any:
+def new_arm(folder: Path, surroundings: FixedSurroundings, name: str, pose: Pose = BASE) -> Any:
     cls = importlib.import_module("plain_driver.plain_arm").PlainArm
     device = cls("id", name, pose)
-    device.now, device.ways = joints(READY), []
-    device.surround(around)
+    device.now, device.paths = joints(READY), []
+    device.surround(surroundings)
     return device
 
 

@@ -16,7 +16,7 @@ from arcor2_hw.data.address import host_of, is_address_name
         ("https://[::1]:80", "::1"),
         ("socket://plc1:4001", "plc1"),
         ("http://plc1.evil?x=1", "plc1.evil"),
-        # Not only hosts: any other text is another address.
+        # Texts without a valid host are returned unchanged.
         ("/dev/ttyUSB0", "/dev/ttyUSB0"),
         ("http://plc1@evil/", "http://plc1@evil/"),
         ("http://plc1:80@evil/", "http://plc1:80@evil/"),
@@ -24,15 +24,15 @@ from arcor2_hw.data.address import host_of, is_address_name
         ("http://plc1\n.evil/", "http://plc1\n.evil/"),
     ],
 )
-def test_the_host_of_an_address(address: str, host: str) -> None:
+def test_the_host_of_an_address_is_found(address: str, host: str) -> None:
     assert host_of(address) == host
 
 
 @pytest.mark.parametrize("name", ["host", "url", "address", "port", "serial_port", "robot_ip", "baseUrl", "host2"])
-def test_a_setting_with_an_address(name: str) -> None:
+def test_names_of_address_settings_are_recognised(name: str) -> None:
     assert is_address_name(name)
 
 
 @pytest.mark.parametrize("name", ["name", "report", "ghost", "password", "port_count", "user"])
-def test_a_setting_without_an_address(name: str) -> None:
+def test_names_of_other_settings_are_not_addresses(name: str) -> None:
     assert not is_address_name(name)

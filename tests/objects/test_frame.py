@@ -34,7 +34,7 @@ def test_rays_equal_those_of_opencv(coefficients: list[float]) -> None:
         found[0, 0] = 0
 
 
-def test_point_cloud_of_a_plane() -> None:
+def test_depth_pixels_become_points_in_metres() -> None:
     parameters = CameraParameters(500.0, 500.0, 160.0, 120.0, [0.0] * 4)
     depth = np.full((240, 320), 750, np.uint16)
     depth[0, 0] = 0

@@ -64,12 +64,12 @@ def claw(arm: Any, board: Board) -> Claw:
     return claw
 
 
-def below_tip(around: FixedSurroundings, arm: Any) -> Any:
+def below_tip(surroundings: FixedSurroundings, arm: Any) -> Any:
     """Put a bin below a sideways line, so that only a long part touches it. Return the target."""
     here = arm.get_end_effector_pose("tcp")
     target = moved(here, 0.0, 0.25, 0.0)
     at = (BASE.inverted() * target).position
-    around.box("bin", at + Position(0.0, 0.0, -0.2), 0.06, 0.06, 0.1)
+    surroundings.box("bin", at + Position(0.0, 0.0, -0.2), 0.06, 0.06, 0.1)
     return target
 
 
@@ -78,8 +78,8 @@ def line(arm: Any, target: Pose) -> None:
     arm.move_to_pose("tcp", target, 0.5)
 
 
-def test_a_gripped_part_is_considered_until_released(arm: Any, around: FixedSurroundings, claw: Claw) -> None:
-    target = below_tip(around, arm)
+def test_a_gripped_part_is_considered_until_released(arm: Any, surroundings: FixedSurroundings, claw: Claw) -> None:
+    target = below_tip(surroundings, arm)
     claw.grip(0.0, 1.0, 1.0)
     line(arm, target)  # of an unknown size
     claw.set_part(0.03, 0.03, 0.28, 0.14)
@@ -98,11 +98,11 @@ def values_of(arm: Any, target: Pose) -> Any:
 
 
 def test_an_object_of_the_scene_moves_with_the_tool(
-    arm: Any, around: FixedSurroundings, claw: Claw, board: Board
+    arm: Any, surroundings: FixedSurroundings, claw: Claw, board: Board
 ) -> None:
-    target = below_tip(around, arm)
-    around.box("board", (BASE.inverted() * board.pose).position, 0.03, 0.03, 0.28)
-    around.things[-1].pose.orientation = board.pose.orientation
+    target = below_tip(surroundings, arm)
+    surroundings.box("board", (BASE.inverted() * board.pose).position, 0.03, 0.03, 0.28)
+    surroundings.things[-1].pose.orientation = board.pose.orientation
     with pytest.raises(NotFound, match="no object lid"):
         claw.set_part_object("lid")
     with pytest.raises(NotFound, match="plain: the scene has no collision object"):
@@ -112,18 +112,18 @@ def test_an_object_of_the_scene_moves_with_the_tool(
     with pytest.raises(arm.KinematicsException, match="board and bin"):
         line(arm, target)
     arm.now = joints((0.5, *READY[1:]))
-    there = arm.get_end_effector_pose("tcp") * Pose(Position(0.0, 0.0, 0.15))
+    expected = arm.get_end_effector_pose("tcp") * Pose(Position(0.0, 0.0, 0.15))
     claw.release()
-    assert np.allclose(board.pose.matrix(), there.matrix(), atol=1e-9)
+    assert np.allclose(board.pose.matrix(), expected.matrix(), atol=1e-9)
     line(arm, moved(target, 0.0, -0.1, 0.0))
     claw.grip(0.0, 1.0, 1.0)
     assert arm.parts == {}, "only the next grip takes the object"
 
 
-def test_a_gripped_part_may_touch_the_surface_below(arm: Any, around: FixedSurroundings, claw: Claw) -> None:
+def test_a_gripped_part_may_touch_the_surface_below(arm: Any, surroundings: FixedSurroundings, claw: Claw) -> None:
     here = arm.get_end_effector_pose("tcp")
     at = (BASE.inverted() * here).position
-    around.box("table", at + Position(0.0, 0.0, -0.07), 0.3, 0.3, 0.1)  # its top 20 mm below the tip
+    surroundings.box("table", at + Position(0.0, 0.0, -0.07), 0.3, 0.3, 0.1)  # its top 20 mm below the tip
     claw.set_part(0.03, 0.03, 0.04)
     claw.grip(0.0, 1.0, 1.0)
     arm.move_to_pose("tcp", moved(here, 0.0, 0.0, 0.1), 0.5)

@@ -8,7 +8,7 @@ import pytest
 from arcor2_hw.objects.line import Line
 
 
-def test_an_answer_counts_that_came_while_the_process_was_suspended(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_that_arrives_while_the_process_is_suspended_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         line = Line("scale", f"socket://127.0.0.1:{server.getsockname()[1]}", answer_timeout=0.1)
         line.open(10.0)

@@ -180,13 +180,13 @@ def test_the_time_limit_is_exact_although_bytes_keep_arriving(peer: Peer, link: 
             peer.connections[-1].sendall(b"\0")
 
     peer.script = script
-    began = time.monotonic()
+    start = time.monotonic()
     with (
         link.limited(0.2),
         pytest.raises(DeviceTimeout, match=r"no valid answer within 0.2 s .*; it may have been executed$"),
     ):
         link.write_register(0, 1)
-    assert time.monotonic() - began > 0.19
+    assert time.monotonic() - start > 0.19
     ended.set()
     assert len(peer.requests) == 1
 
@@ -224,8 +224,8 @@ def test_a_connection_closed_by_the_device_stays_lost(peer: Peer, link: ModbusLi
 def test_close_wakes_waiting_threads(peer: Peer) -> None:
     link = ModbusLink("press", "127.0.0.1", peer.port, request_timeout=2.0 * WITHIN)
     link.open(WITHIN)
-    came = threading.Event()
-    peer.script = lambda _: came.set()
+    received = threading.Event()
+    peer.script = lambda _: received.set()
     failed: list[Exception] = []
 
     def ask() -> None:
@@ -236,7 +236,7 @@ def test_close_wakes_waiting_threads(peer: Peer) -> None:
 
     thread = threading.Thread(target=ask)
     thread.start()
-    assert came.wait(WITHIN)
+    assert received.wait(WITHIN)
     link.close()
     thread.join(WITHIN)
     assert failed
@@ -288,9 +288,9 @@ def test_requests_of_several_threads_do_not_mix(peer: Peer, link: ModbusLink) ->
 
 
 def test_an_unreachable_device_is_named() -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))  # not listening: refuses
-        link = ModbusLink("press", *taken.getsockname())
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))  # not listening: refuses
+        link = ModbusLink("press", *unused.getsockname())
         with pytest.raises(NotConnected, match=r"^press at 127\.0\.0\.1:.* cannot be reached: connection refused"):
             link.open(WITHIN)
     with pytest.raises(NotConnected, match="the port cannot be opened"):

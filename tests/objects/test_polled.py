@@ -62,7 +62,7 @@ def polled(device: Device) -> Iterator[Polled[int]]:
     polled.disconnect()
 
 
-def failing(call: Callable[[], object]) -> tuple[threading.Thread, list[BaseException]]:
+def run_in_thread(call: Callable[[], object]) -> tuple[threading.Thread, list[BaseException]]:
     errors: list[BaseException] = []
 
     def run() -> None:
@@ -88,7 +88,7 @@ def test_wait_ignores_a_reading_in_progress(polled: Polled[int], device: Device)
     wait_for(lambda: device.reading)
     count = device.count
     seen: list[int] = []
-    thread, errors = failing(lambda: seen.append(polled.fresh().value))
+    thread, errors = run_in_thread(lambda: seen.append(polled.fresh().value))
     time.sleep(0.05)
     device.answers.set()
     thread.join()
@@ -118,7 +118,7 @@ def test_an_old_state_is_stale(polled: Polled[int], device: Device) -> None:
 
 def test_a_stop_cancels_only_work_that_has_started(polled: Polled[int], device: Device) -> None:
     go_on = polled.begin("pressing")
-    thread, errors = failing(lambda: polled.wait(lambda _: False, WITHIN, "pressing", go_on))
+    thread, errors = run_in_thread(lambda: polled.wait(lambda _: False, WITHIN, "pressing", go_on))
     time.sleep(0.05)
     polled.stop_waiting()
     thread.join(WITHIN)
@@ -131,7 +131,7 @@ def test_a_stop_cancels_only_work_that_has_started(polled: Polled[int], device: 
 
 def test_a_short_connection_loss_ends_waiting(polled: Polled[int], device: Device) -> None:
     go_on = polled.begin("pressing")
-    thread, errors = failing(lambda: polled.wait(lambda _: False, WITHIN, "pressing"))
+    thread, errors = run_in_thread(lambda: polled.wait(lambda _: False, WITHIN, "pressing"))
     time.sleep(0.05)
     device.broken = True
     thread.join(WITHIN)
@@ -146,7 +146,7 @@ def test_a_short_connection_loss_ends_waiting(polled: Polled[int], device: Devic
 
 
 def test_disconnecting_ends_waiting_without_reporting_a_loss(polled: Polled[int], device: Device) -> None:
-    thread, errors = failing(lambda: polled.wait(lambda _: False, WITHIN, "pressing"))
+    thread, errors = run_in_thread(lambda: polled.wait(lambda _: False, WITHIN, "pressing"))
     time.sleep(0.05)
     device.answers.clear()
     polled.disconnect()
@@ -184,7 +184,9 @@ def test_an_unsolicited_state_is_stored(device: Device) -> None:
     try:
         first = polled.current()
         asked: list[float] = []
-        thread, errors = failing(lambda: asked.append(polled.wait(lambda value: value > 6, WITHIN, "seven").asked))
+        thread, errors = run_in_thread(
+            lambda: asked.append(polled.wait(lambda value: value > 6, WITHIN, "seven").asked)
+        )
         polled.put(6, time.monotonic())
         polled.put(7, began := time.monotonic() + 1e-3)
         thread.join(WITHIN)

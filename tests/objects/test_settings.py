@@ -13,7 +13,7 @@ from arcor2_hw.objects.settings import check_host, check_serial_port, check_url,
 
 
 @pytest.mark.parametrize("port", ["/dev/does-not-exist", "/dev/null", "socket://10.0.0.7:4001", "socket://[::1]:4001"])
-def test_serial_ports(port: str) -> None:
+def test_serial_ports_are_accepted(port: str) -> None:
     check_serial_port("port", port)
 
 
@@ -60,7 +60,7 @@ def test_links_check_their_ports(tmp_path: Path) -> None:
     assert victim.read_text() == "[]"
 
 
-def test_urls() -> None:
+def test_urls_are_accepted() -> None:
     assert check_url("url", "https://erp.example:8443/api/v1", "http", "https").port == 8443
     assert check_url("url", "opc.tcp://[::1]:4840", "opc.tcp").hostname == "::1"
 
@@ -92,7 +92,7 @@ def test_other_texts_are_not_urls(url: str) -> None:
 
 
 @pytest.mark.parametrize("host", ["ur5e", "ur5e.cell.example", "192.168.0.7", "fe80::1%eth0", "[::1]"])
-def test_hosts(host: str) -> None:
+def test_hosts_are_accepted(host: str) -> None:
     check_host(host, 502)
 
 

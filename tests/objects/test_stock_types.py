@@ -39,7 +39,7 @@ def test_an_except_clause_does_not_catch_finish() -> None:
         try:
             FlowActions("obj", "flow").finish(an="end")
         except Exception:
-            pytest.fail("a script would swallow the end of the program")
+            pytest.fail("an except clause has caught the end of the program")
 
     with pytest.raises(ProgramFinished):
         script()
@@ -49,9 +49,9 @@ def test_an_except_clause_does_not_catch_finish() -> None:
 def test_a_wait_ends_in_time_or_when_cancelled(obj: FlowActions | TimeActions, method: str) -> None:
     wait = getattr(obj, method)
     assert deadline_of(wait) is None
-    began = time.monotonic()
+    start = time.monotonic()
     wait(0.02, an="a")
-    assert time.monotonic() - began >= 0.02
+    assert time.monotonic() - start >= 0.02
 
     errors: list[BaseException] = []
 
@@ -89,7 +89,7 @@ def test_a_message_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     assert caplog.messages == ["flow: message: Refill 100 % of {labels}"]
 
 
-def test_counters() -> None:
+def test_counters_count_compare_and_reset() -> None:
     counter = CounterActions("obj", "boards", CounterSettings(start=3))
     assert counter.value(an="a") == 3
     assert counter.increment(2, an="a") == 5
@@ -103,7 +103,7 @@ def test_counters() -> None:
     assert CounterActions("obj", "other").value(an="a") == 0
 
 
-def test_logic() -> None:
+def test_logic_actions_compare_and_combine_values() -> None:
     logic = LogicActions("obj", "logic")
     assert logic.equals(0.1 + 0.2, 0.3, an="a")
     assert not logic.equals(1.0, 1.1, an="a")
@@ -144,7 +144,7 @@ def test_random_numbers_keep_their_range_and_seed() -> None:
         chance.random_double(2.0, 1.0)
 
 
-def test_time() -> None:
+def test_time_actions_return_the_time_and_elapsed_time() -> None:
     timer = TimeActions("obj", "time")
     before = time.time_ns()
     assert before <= timer.time_ns(an="a") <= time.time_ns()

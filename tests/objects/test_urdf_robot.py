@@ -23,19 +23,19 @@ from arcor2_hw.objects import safe_moves
 from arcor2_hw.objects.surroundings import Obstacle
 from arcor2_hw.planning import planner
 
-from .conftest import ACROSS, BASE, READY, SOURCE, URDF, WALL, FixedSurroundings, joints, made, moved, values
+from .conftest import ACROSS, BASE, READY, SOURCE, URDF, WALL, FixedSurroundings, joints, moved, new_arm, values
 
 
-def assert_free(arm: Any, around: FixedSurroundings, way: list[list[Joint]]) -> None:
+def assert_free(arm: Any, surroundings: FixedSurroundings, path: list[list[Joint]]) -> None:
     """Check a path in a separate collision world with a finer resolution."""
     model = RobotModel.load(URDF)
     world = CollisionWorld()
     world.add_robot("arm", model, BASE)
-    for thing in around.things:
+    for thing in surroundings.things:
         box = thing.model
         assert isinstance(box, object_type.Box)
         world.put(thing.name, Box(box.size_x, box.size_y, box.size_z), thing.pose)
-    for a, b in itertools.pairwise(values(waypoint) for waypoint in way):
+    for a, b in itertools.pairwise(values(waypoint) for waypoint in path):
         for share in np.linspace(0.0, 1.0, 2 + int(np.abs(b - a).max() / 0.005)):
             assert world.is_free("arm", a + share * (b - a)), world.contacts("arm", a + share * (b - a))
 
@@ -84,12 +84,12 @@ def test_kinematics_use_world_coordinates(arm: Any) -> None:
         arm.forward_kinematics("tcp", joints(READY)[:2])
 
 
-def test_inverse_kinematics_avoids_obstacles_on_request(arm: Any, around: FixedSurroundings) -> None:
+def test_inverse_kinematics_avoids_obstacles_on_request(arm: Any, surroundings: FixedSurroundings) -> None:
     goal = moved(arm.get_end_effector_pose("tcp"), 0.0, 0.1, 0.0)
     first = arm.inverse_kinematics("tcp", goal)
     model = RobotModel.load(URDF)
     elbow = model.link_poses(values(first))["forearm_link"][:3, 3]
-    around.box("post", Position(*map(float, elbow)), 0.05, 0.05, 0.05)
+    surroundings.box("post", Position(*map(float, elbow)), 0.05, 0.05, 0.05)
     other = arm.inverse_kinematics("tcp", goal)
     assert np.abs(values(other) - values(first)).max() > 0.5
     assert arm.safe_moves.contacts(other) == []
@@ -98,65 +98,65 @@ def test_inverse_kinematics_avoids_obstacles_on_request(arm: Any, around: FixedS
 
 
 # ------------------------------------------------------------------------------------------------ moves
-def test_only_a_safe_move_avoids_obstacles(arm: Any, around: FixedSurroundings) -> None:
-    around.box("wall", *WALL)
+def test_only_a_safe_move_avoids_obstacles(arm: Any, surroundings: FixedSurroundings) -> None:
+    surroundings.box("wall", *WALL)
     arm.move_to_joints(joints(ACROSS), 0.5)
-    (way,) = arm.ways
-    assert len(way.waypoints) > 2
-    assert_free(arm, around, way.waypoints)
+    (path,) = arm.paths
+    assert len(path.waypoints) > 2
+    assert_free(arm, surroundings, path.waypoints)
     assert np.allclose(values(arm.now), ACROSS)
     arm.now = joints(READY)
     arm.move_to_joints(joints(ACROSS), 0.5, safe=False)
-    assert len(arm.ways[-1].waypoints) == 2
+    assert len(arm.paths[-1].waypoints) == 2
     with pytest.raises(AssertionError):
-        assert_free(arm, around, arm.ways[-1].waypoints)
+        assert_free(arm, surroundings, arm.paths[-1].waypoints)
 
 
-def test_a_safe_move_to_a_pose_avoids_obstacles(arm: Any, around: FixedSurroundings) -> None:
-    around.box("wall", *WALL)
+def test_a_safe_move_to_a_pose_avoids_obstacles(arm: Any, surroundings: FixedSurroundings) -> None:
+    surroundings.box("wall", *WALL)
     goal = arm.forward_kinematics("tcp", joints(ACROSS))
     arm.move_to_pose("tcp", goal, 0.5, safe=True, linear=False)
-    assert_free(arm, around, arm.ways[-1].waypoints)
+    assert_free(arm, surroundings, arm.paths[-1].waypoints)
     assert np.allclose(arm.get_end_effector_pose("tcp").matrix(), goal.matrix(), atol=1e-5)
 
 
-def test_a_linear_move_is_straight_or_refused(arm: Any, around: FixedSurroundings) -> None:
+def test_a_linear_move_is_straight_or_refused(arm: Any, surroundings: FixedSurroundings) -> None:
     here = arm.get_end_effector_pose("tcp")
     goal = moved(here, 0.0, 0.3, 0.0)
     arm.move_to_pose("tcp", goal, 0.5)
-    way = arm.ways[-1]
-    assert way.line
-    for waypoint in way.waypoints:
+    path = arm.paths[-1]
+    assert path.line
+    for waypoint in path.waypoints:
         at = arm.forward_kinematics("tcp", waypoint).position
         share = here.position.distance_to(at) / 0.3
         on = moved(here, 0.0, 0.3 * share, 0.0).position
         assert on.distance_to(at) < 1e-4
     arm.now = joints(READY)
     post = BASE.inverted() * moved(here, 0.0, 0.2, 0.0)
-    around.box("post", post.position, 0.02, 0.02, 0.3)
+    surroundings.box("post", post.position, 0.02, 0.02, 0.3)
     with pytest.raises(arm.KinematicsException, match=r"plain cannot go straight: 0\.1\d\d m .* plain/.* and post"):
         arm.move_to_pose("tcp", goal, 0.5)
-    assert len(arm.ways) == 1
+    assert len(arm.paths) == 1
     arm.move_to_pose("tcp", goal, 0.5, safe=False)
-    assert len(arm.ways) == 2
+    assert len(arm.paths) == 2
 
 
-def test_a_move_may_end_close_to_an_obstacle(arm: Any, around: FixedSurroundings) -> None:
+def test_a_move_may_end_close_to_an_obstacle(arm: Any, surroundings: FixedSurroundings) -> None:
     """A pick ends nearer to the table than the margin, without touching it."""
     here = BASE.inverted() * arm.get_end_effector_pose("tcp")
-    around.box("table", here.position + Position(0.0, 0.0, -0.152), 0.4, 0.4, 0.1)
+    surroundings.box("table", here.position + Position(0.0, 0.0, -0.152), 0.4, 0.4, 0.1)
     arm.move_to_pose("tcp", moved(arm.get_end_effector_pose("tcp"), 0.0, 0.0, -0.1), 0.2)
     arm.move_to_pose("tcp", BASE * here, 0.2)
     with pytest.raises(arm.KinematicsException, match="table"):
         arm.move_to_pose("tcp", moved(BASE * here, 0.0, 0.0, -0.105), 0.2)
 
 
-def test_a_refused_move_names_the_reason(arm: Any, around: FixedSurroundings) -> None:
+def test_a_refused_move_names_the_reason(arm: Any, surroundings: FixedSurroundings) -> None:
     tip = BASE.inverted() * arm.forward_kinematics("tcp", joints(ACROSS))
-    around.box("crate", tip.position, 0.1, 0.1, 0.1)
+    surroundings.box("crate", tip.position, 0.1, 0.1, 0.1)
     with pytest.raises(arm.KinematicsException, match="in collision at the goal: plain/wrist_3_link and crate"):
         arm.move_to_joints(joints(ACROSS), 0.5)
-    around.unknown = "second"
+    surroundings.unknown = "second"
     with pytest.raises(Refused, match="The position of second is unknown"):
         arm.move_to_joints(joints(ACROSS), 0.5)
     arm.move_to_joints(joints(ACROSS), 0.5, safe=False)
@@ -167,40 +167,40 @@ def test_a_refused_move_names_the_reason(arm: Any, around: FixedSurroundings) ->
         arm.move_to_joints(joints((0.0, 0.0, 9.0, 0.0, 0.0, 0.0)), 0.5)
     with pytest.raises(InvalidData):
         arm.move_to_joints(joints(READY)[1:], 0.5)
-    assert len(arm.ways) == 1
+    assert len(arm.paths) == 1
 
 
 def test_a_held_part_moves_with_the_robot_and_avoids_obstacles(
-    folder: Path, arm: Any, around: FixedSurroundings
+    folder: Path, arm: Any, surroundings: FixedSurroundings
 ) -> None:
     middle = BASE.inverted() * arm.forward_kinematics("tcp", joints((1.2, *READY[1:])))
-    around.box("bin", middle.position + Position(0.0, 0.0, -0.3), 0.06, 0.06, 0.1)
+    surroundings.box("bin", middle.position + Position(0.0, 0.0, -0.3), 0.06, 0.06, 0.1)
     goal = joints((2.4, *READY[1:]))
     arm.move_to_joints(goal, 0.5)
-    assert len(arm.ways[-1].waypoints) == 2
+    assert len(arm.paths[-1].waypoints) == 2
     arm.now = joints(READY)
     tip = BASE.inverted() * arm.get_end_effector_pose("tcp")
-    around.box("rod", tip.position + Position(0.0, 0.0, -0.15), 0.03, 0.03, 0.28)
+    surroundings.box("rod", tip.position + Position(0.0, 0.0, -0.15), 0.03, 0.03, 0.28)
     arm.safe_moves.hold("rod", "tcp", arm.now)
     arm.move_to_joints(goal, 0.5)
-    way = arm.ways[-1].waypoints
-    assert len(way) > 2
+    path = arm.paths[-1].waypoints
+    assert len(path) > 2
     # The rod, in a separate collision world of the test.
     world = CollisionWorld()
     world.add_robot("arm", RobotModel.load(URDF), BASE, np.array(READY))
     for name in ("rod", "bin"):
-        thing = next(each for each in around.things if each.name == name)
+        thing = next(each for each in surroundings.things if each.name == name)
         assert isinstance(thing.model, object_type.Box)
         world.put(name, Box(thing.model.size_x, thing.model.size_y, thing.model.size_z), thing.pose)
     world.attach("rod", "arm", "tcp")
-    for a, b in itertools.pairwise(values(waypoint) for waypoint in way):
+    for a, b in itertools.pairwise(values(waypoint) for waypoint in path):
         for share in np.linspace(0.0, 1.0, 2 + int(np.abs(b - a).max() / 0.005)):
             assert world.is_free("arm", a + share * (b - a))
     # A part held by another robot is an obstacle at the other robot's gripper.
-    second = made(folder, around, "second", BASE * Pose(Position(0.0, 1.9, 0.0)))
-    around.others = [(arm, arm.now)]
+    second = new_arm(folder, surroundings, "second", BASE * Pose(Position(0.0, 1.9, 0.0)))
+    surroundings.others = [(arm, arm.now)]
     rod = arm.safe_moves.forward("tcp", arm.now) * Pose(Position(0.0, 0.0, 0.15))
-    second.surround(around)
+    second.surround(surroundings)
     world.set_joints("arm", values(arm.now))
     assert world.pose("rod").position.distance_to(rod.position) < 0.01
     seen = second.safe_moves._snapshot().obstacles["rod"]
@@ -217,45 +217,45 @@ def test_a_held_part_moves_with_the_robot_and_avoids_obstacles(
         arm.safe_moves.hold("bin", "claw", arm.now)
 
 
-def test_another_robot_is_an_obstacle(folder: Path, arm: Any, around: FixedSurroundings) -> None:
+def test_another_robot_is_an_obstacle(folder: Path, arm: Any, surroundings: FixedSurroundings) -> None:
     beside = BASE * Pose(Position(0.75, 0.0, 0.0), Orientation.from_rotation_vector(0.0, 0.0, np.pi))
-    second = made(folder, FixedSurroundings(), "second", beside)
-    around.others = [(second, joints((0.0, -1.57, 0.0, -1.57, 0.0, 0.0)))]
+    second = new_arm(folder, FixedSurroundings(), "second", beside)
+    surroundings.others = [(second, joints((0.0, -1.57, 0.0, -1.57, 0.0, 0.0)))]
     here = arm.get_end_effector_pose("tcp")
     arm.move_to_pose("tcp", moved(here, 0.0, 0.0, 0.02), 0.5)
-    around.others = [(second, joints(READY))]
+    surroundings.others = [(second, joints(READY))]
     with pytest.raises(arm.KinematicsException, match=r"plain/.* and second/"):
         arm.move_to_pose("tcp", here, 0.5)
 
 
 def test_a_missing_mesh_refuses_moves_and_a_present_one_is_considered(
-    arm: Any, around: FixedSurroundings, tmp_path: Path
+    arm: Any, surroundings: FixedSurroundings, tmp_path: Path
 ) -> None:
     import trimesh
 
-    around.things.append(Obstacle("shield", object_type.Mesh("shield", "shield.stl"), BASE * Pose(WALL[0])))
+    surroundings.things.append(Obstacle("shield", object_type.Mesh("shield", "shield.stl"), BASE * Pose(WALL[0])))
     with pytest.raises(Refused, match="mesh of shield is not available"):
         arm.move_to_joints(joints(ACROSS), 0.5)
-    around.files["shield.stl"] = tmp_path / "0f3a"
-    around.files["shield.stl"].write_bytes(trimesh.creation.box(WALL[1:]).export(file_type="stl"))
+    surroundings.files["shield.stl"] = tmp_path / "0f3a"
+    surroundings.files["shield.stl"].write_bytes(trimesh.creation.box(WALL[1:]).export(file_type="stl"))
     arm.move_to_joints(joints(ACROSS), 0.5)
-    around.things = []
-    around.box("wall", *WALL)
-    assert_free(arm, around, arm.ways[-1].waypoints)
+    surroundings.things = []
+    surroundings.box("wall", *WALL)
+    assert_free(arm, surroundings, arm.paths[-1].waypoints)
 
 
-def test_an_uploaded_model_takes_precedence(arm: Any, around: FixedSurroundings, tmp_path: Path) -> None:
+def test_an_uploaded_model_takes_precedence(arm: Any, surroundings: FixedSurroundings, tmp_path: Path) -> None:
     longer = tmp_path / "88c1"
     text = URDF.read_text().replace('xyz="0 0 0.0996"', 'xyz="0 0 0.1996"')
     assert text != URDF.read_text()
     longer.write_text(text)
-    around.files["plain_arm.zip"] = longer
+    surroundings.files["plain_arm.zip"] = longer
     tip = (BASE.inverted() * arm.get_end_effector_pose("tcp")).position
     nominal = RobotModel.load(URDF).arm("tcp").pose(np.array(READY)).position
     assert nominal.distance_to(tip) == pytest.approx(0.1, abs=1e-6)
 
 
-def test_a_missing_model_is_reported(folder: Path, around: FixedSurroundings) -> None:
+def test_a_missing_model_is_reported(folder: Path, surroundings: FixedSurroundings) -> None:
     cls = importlib.import_module("plain_driver.plain_arm").PlainArm
     other = type("Nameless", (cls,), {"urdf_package_name": "missing.zip", "__module__": cls.__module__})
     device = other("id", "nameless", BASE)
@@ -264,41 +264,43 @@ def test_a_missing_model_is_reported(folder: Path, around: FixedSurroundings) ->
 
 
 # ------------------------------------------------------------------------------------------------ time limits and stops
-def test_a_path_can_be_sampled_over_time(arm: Any, around: FixedSurroundings) -> None:
-    around.box("wall", *WALL)
+def test_a_path_can_be_sampled_over_time(arm: Any, surroundings: FixedSurroundings) -> None:
+    surroundings.box("wall", *WALL)
     arm.move_to_joints(joints(ACROSS), 0.5)
-    way = arm.ways[-1]
-    timed = way.timed()
+    path = arm.paths[-1]
+    timed = path.timed()
     limits = RobotModel.load(URDF).velocity
     rates = np.array([velocity for _, _, velocity in timed.sampled(0.01)])
     assert (np.abs(rates).max(axis=0) <= 0.5 * limits * 1.001).all()
     assert np.allclose(timed.at(timed.duration)[0], ACROSS)
-    assert_free(arm, around, [joints(tuple(q)) for _, q, _ in timed.sampled(0.02)])
+    assert_free(arm, surroundings, [joints(tuple(q)) for _, q, _ in timed.sampled(0.02)])
     arm.now = joints(READY)
     arm.move_to_pose("tcp", moved(arm.get_end_effector_pose("tcp"), 0.0, 0.25, 0.0), 1.0, safe=False)
-    assert arm.ways[-1].timed(0.05).duration == pytest.approx(0.25 / 0.05 + 0.25, rel=0.1)
+    assert arm.paths[-1].timed(0.05).duration == pytest.approx(0.25 / 0.05 + 0.25, rel=0.1)
 
 
-def fences(around: FixedSurroundings) -> None:
-    """Plates on both sides of the base, higher than the arm, so that its shoulder cannot turn past them."""
+def fences(surroundings: FixedSurroundings) -> None:
+    """Put plates on both sides of the base, higher than the arm, so that its shoulder cannot turn past them."""
     for side in (-1.0, 1.0):
-        around.box(f"fence {side:+.0f}", Position(0.0, side * 0.68, 0.5), 0.02, 1.06, 3.0)
+        surroundings.box(f"fence {side:+.0f}", Position(0.0, side * 0.68, 0.5), 0.02, 1.06, 3.0)
 
 
 BEFORE, BEHIND = (0.8, *READY[1:]), (0.8 + np.pi, *READY[1:])
 
 
-def test_a_move_without_a_path_is_refused(arm: Any, around: FixedSurroundings, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_move_without_a_path_is_refused(
+    arm: Any, surroundings: FixedSurroundings, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 0.3)
-    fences(around)
+    fences(surroundings)
     arm.now = joints(BEFORE)
     with pytest.raises(arm.KinematicsException, match=r"plain found no .* within 0\.3 s; .* and fence"):
         arm.move_to_joints(joints(BEHIND), 0.5)
-    assert arm.ways == []
+    assert arm.paths == []
 
 
 def test_a_repeat_after_no_path_has_more_time_and_another_seed(
-    arm: Any, around: FixedSurroundings, monkeypatch: pytest.MonkeyPatch
+    arm: Any, surroundings: FixedSurroundings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 0.05)
     seeds: list[int] = []
@@ -309,7 +311,7 @@ def test_a_repeat_after_no_path_has_more_time_and_another_seed(
         return plan(*args, seed=seed, **options)
 
     monkeypatch.setattr(planner.Planner, "to_any", recorded)
-    fences(around)
+    fences(surroundings)
     arm.now = joints(BEFORE)
     for within in (r"0\.05", r"0\.1", r"0\.2", r"0\.2"):
         with pytest.raises(arm.KinematicsException, match=f"within {within} s"):
@@ -319,13 +321,13 @@ def test_a_repeat_after_no_path_has_more_time_and_another_seed(
     assert seeds[-1] == 0
     with pytest.raises(arm.KinematicsException, match=r"within 0\.05 s"):
         arm.move_to_joints(joints((0.9 + np.pi, *READY[1:])), 0.5)
-    around.things.clear()
+    surroundings.things.clear()
     arm.move_to_joints(joints(BEHIND), 0.5)
     assert seeds[-1] == 4
-    assert len(arm.ways) == 2
+    assert len(arm.paths) == 2
 
 
-class Steps:
+class StepClock:
     """A clock that advances by a second whenever it is read, so that time limits are numbers of steps of the search."""
 
     def __init__(self) -> None:
@@ -337,16 +339,16 @@ class Steps:
 
 
 def test_a_repeat_finds_a_path_that_was_not_found_in_time(
-    arm: Any, around: FixedSurroundings, folder: Path, monkeypatch: pytest.MonkeyPatch
+    arm: Any, surroundings: FixedSurroundings, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Seed 0 needs 152 steps and seed 1 needs 50: the repeat needs another seed as well as more time."""
-    monkeypatch.setattr(planner, "time", Steps())
+    monkeypatch.setattr(planner, "time", StepClock())
     monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 42.0)
-    around.box("wall", *WALL)
+    surroundings.box("wall", *WALL)
     start, goal = joints((2.3, -1.2, *READY[2:])), joints(READY)
     plan = planner.Planner.to_any
     for forced in ({"seed": 0, "within": 84.0}, {"seed": 1, "within": 42.0}):
-        other = made(folder, around, "other")
+        other = new_arm(folder, surroundings, "other")
         other.now = start
         with monkeypatch.context() as only:
             only.setattr(planner.Planner, "to_any", lambda *a, forced=forced, **options: plan(*a, **options | forced))
@@ -355,15 +357,15 @@ def test_a_repeat_finds_a_path_that_was_not_found_in_time(
     arm.now = start
     with pytest.raises(arm.KinematicsException, match="within 42 s"):
         arm.move_to_joints(goal, 0.5)
-    assert arm.ways == []
+    assert arm.paths == []
     arm.move_to_joints(goal, 0.5)
     assert np.allclose(values(arm.now), READY)
-    assert_free(arm, around, arm.ways[-1].waypoints)
+    assert_free(arm, surroundings, arm.paths[-1].waypoints)
 
 
-def test_a_stop_ends_planning(arm: Any, around: FixedSurroundings, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stop_ends_planning(arm: Any, surroundings: FixedSurroundings, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 60.0)
-    fences(around)
+    fences(surroundings)
     arm.now = joints(BEFORE)
     ended: list[BaseException] = []
 
@@ -384,10 +386,10 @@ def test_a_stop_ends_planning(arm: Any, around: FixedSurroundings, monkeypatch: 
         arm.stop()
         thread.join(30.0)
     assert [type(error) for error in ended] == [Cancelled]
-    assert arm.ways == []
+    assert arm.paths == []
 
 
-def test_one_move_at_a_time(arm: Any) -> None:
+def test_a_second_move_is_refused_during_a_move(arm: Any) -> None:
     def follow(_: Any) -> None:
         with pytest.raises(Refused, match="moving already"):
             arm.move_to_joints(joints(READY), 0.5)
