@@ -21,7 +21,7 @@ from .other import *
 from . import other
 from .other import X as Y
 """
-WHOLE = (
+COMPLETE_SOURCE = (
     HEAD
     + '''
 LIMIT = 2.0
@@ -155,7 +155,7 @@ def modules(draw: st.DrawFn) -> str:
     return "\n".join(lines)
 
 
-def sound(source: str | bytes, other: str = OTHER) -> None:
+def assert_valid_result(source: str | bytes, other: str = OTHER) -> None:
     lib = Library([SourceFile("T", "t", source), SourceFile("Other", "other", other)])
     for name in ("T", "Other"):
         found = lib.analyse(name)
@@ -174,20 +174,20 @@ EXAMPLES = settings(max_examples=150, deadline=None, suppress_health_check=[Heal
 
 @EXAMPLES
 @given(st.one_of(st.text(max_size=200), st.binary(max_size=200), st.text(string.printable, max_size=300)))
-def test_any_source_gets_an_answer(source: str | bytes) -> None:
-    sound(source)
+def test_any_source_has_a_valid_result(source: str | bytes) -> None:
+    assert_valid_result(source)
 
 
 @EXAMPLES
 @given(modules())
-def test_any_expression_may_be_replaced_by_anything(source: str) -> None:
-    sound(source)
+def test_a_module_with_arbitrary_expressions_has_a_valid_result(source: str) -> None:
+    assert_valid_result(source)
 
 
-TOKENS = [token.string for token in tokenize.generate_tokens(StringIO(WHOLE).readline)]
-PLACES = [
-    sum(len(line) for line in WHOLE.splitlines(keepends=True)[: token.start[0] - 1]) + token.start[1]
-    for token in tokenize.generate_tokens(StringIO(WHOLE).readline)
+TOKENS = [token.string for token in tokenize.generate_tokens(StringIO(COMPLETE_SOURCE).readline)]
+OFFSETS = [
+    sum(len(line) for line in COMPLETE_SOURCE.splitlines(keepends=True)[: token.start[0] - 1]) + token.start[1]
+    for token in tokenize.generate_tokens(StringIO(COMPLETE_SOURCE).readline)
 ]
 
 
@@ -195,16 +195,16 @@ PLACES = [
 @given(
     st.lists(st.tuples(st.integers(0, len(TOKENS) - 1), st.sampled_from([*sorted(set(TOKENS)), "\x00"])), max_size=3)
 )
-def test_a_valid_source_with_some_tokens_replaced(changes: list[tuple[int, str]]) -> None:
-    source = WHOLE
+def test_a_source_with_replaced_tokens_has_a_valid_result(changes: list[tuple[int, str]]) -> None:
+    source = COMPLETE_SOURCE
     for index, replacement in sorted(changes, reverse=True):
-        start = PLACES[index]
+        start = OFFSETS[index]
         source = source[:start] + replacement + source[start + len(TOKENS[index]) :]
-    sound(source)
+    assert_valid_result(source)
 
 
 def test_the_original_source_is_valid() -> None:
-    lib = Library([SourceFile("T", "t", WHOLE),
+    lib = Library([SourceFile("T", "t", COMPLETE_SOURCE),
                    SourceFile("Other", "other", OTHER)])  # fmt: skip
     found = lib.analyse("T")
     assert found.problem is None, found.problem

@@ -32,7 +32,7 @@ def analyse(source: str, name: str = "T", **others: str) -> TypeAnalysis:
     return library(**{name: source}, **others).analyse(name)
 
 
-def the_action(body: str, head: str = "", attributes: str = "") -> ObjectAction:
+def only_action(body: str, head: str = "", attributes: str = "") -> ObjectAction:
     """Return the only action of a type whose class has this body."""
     source = f"{textwrap.dedent(head)}\nclass T(Generic):\n    _ABSTRACT = False\n"
     source += textwrap.indent(textwrap.dedent(attributes) + "\n" + textwrap.dedent(body), "    ")
@@ -60,7 +60,7 @@ def plain(value: object) -> object:
         ("VGC10", "VGC10"),
     ],
 )
-def test_module_names(name: str, module: str) -> None:
+def test_type_names_become_module_names(name: str, module: str) -> None:
     assert module_name(name) == module
 
 
@@ -269,7 +269,7 @@ def test_types_of_a_recorded_session_are_analysed_as_recorded() -> None:
         assert without_texts(json.loads(msgspec.json.encode(found.meta))) == without_texts(wanted)
     actions = json.loads(msgspec.json.encode(lib.analyse("DobotMagician").actions))
     assert without_texts(actions) == without_texts(answers["GetActions"])
-    # All texts of the recording exist, and no others.
+    # The results have texts exactly where the recording has texts.
     for ours, theirs in zip(actions, answers["GetActions"], strict=True):
         assert ("description" in ours) == ("description" in theirs)
         for a, b in zip(ours["parameters"], theirs["parameters"], strict=True):
@@ -304,7 +304,7 @@ def test_a_generated_type_is_analysed() -> None:
 
 # ------------------------------------------------------------------------------------------------ actions
 def test_every_parameter_type_is_described() -> None:
-    action = the_action(
+    action = only_action(
         """
         @action
         def every(self, a: bool, b: int, c: float, d: str, e: Colour, f: Level, g: Pose, h: Position,
@@ -332,7 +332,7 @@ def test_every_parameter_type_is_described() -> None:
     assert not action.disabled
 
 
-def test_enumerations_of_other_files_and_of_the_class_itself() -> None:
+def test_enumerations_of_other_files_and_of_the_class_are_resolved() -> None:
     found = analyse(
         """
         from . import modes
@@ -359,7 +359,7 @@ def test_enumerations_of_other_files_and_of_the_class_itself() -> None:
 
 
 def test_defaults_that_name_constants_are_resolved() -> None:
-    action = the_action(
+    action = only_action(
         """
         @action
         def act(self, a: float = SPEED, b: float = math.pi / 2, c: int = -COUNT, d: float = 3, e: float = LIMIT, *,
@@ -385,7 +385,7 @@ def test_defaults_that_name_constants_are_resolved() -> None:
     ],
 )
 def test_parameter_ranges_are_read(statement: str, extra: str | None) -> None:
-    action = the_action(
+    action = only_action(
         f"@action\ndef act(self, p: float, *, an: str | None = None) -> None:\n    q = p\n    {statement}\n"
     )
     assert action.parameters[0].extra == (msgspec.UNSET if extra is None else extra)
@@ -398,7 +398,7 @@ def test_dynamic_values_and_cancel_mappings_are_read() -> None:
         'DYNAMIC_PARAMS = {"item": DynamicParamTuple(items.__name__, {"store"})}\n'
         'CANCEL_MAPPING: CancelDict = {"act": cancel.__name__}',
     ):
-        action = the_action(
+        action = only_action(
             "@action\ndef act(self, store: str, item: str, *, an: str | None = None) -> None: ...",
             head="from arcor2 import DynamicParamTuple",
             attributes=attributes,
@@ -464,7 +464,7 @@ class T(bases.Generic):
 
 
 def test_former_names_of_actions_and_parameters_are_read() -> None:
-    action = the_action(
+    action = only_action(
         """
         @action(renamed={"low": "minimum", "least": "minimum", "high": "maximum"})
         def draw(self, minimum: int, maximum: int, *, an: str | None = None) -> int: ...
@@ -476,7 +476,7 @@ def test_former_names_of_actions_and_parameters_are_read() -> None:
     assert [parameter.former_names for parameter in action.parameters] == [["low", "least"], ["high"]]
     assert action.present_name("least") == "minimum"
     assert action.present_name("other") == "other"
-    plain_action = the_action("@action\ndef draw(self, *, an: str | None = None) -> int: ...")
+    plain_action = only_action("@action\ndef draw(self, *, an: str | None = None) -> int: ...")
     assert plain_action.former_names is msgspec.UNSET
 
 
@@ -512,7 +512,7 @@ AN = "*, an: str | None = None"
         (f"@action(renamed={{'a': 'b'}})\ndef act(self, a: int, b: int, {AN}) -> None: ...", "act: `renamed` is"),
     ],
 )
-def test_errors_that_disable_only_the_action(method: str, problem: str) -> None:
+def test_an_error_of_an_action_disables_only_the_action(method: str, problem: str) -> None:
     head = "import enum\nclass E(StrEnum):\n    A = 'a'\nclass Empty(StrEnum): ...\nclass Odd(StrEnum):\n    A = 1\n"
     source = f"{head}\nclass T(Generic):\n    _ABSTRACT = False\n" + textwrap.indent(f"@action\n{method}\n", "    ")
     found = analyse(source + f"    @action\n    def fine(self, {AN}) -> None: ...\n")
@@ -787,7 +787,7 @@ def test_robot_features_are_detected(stop: str, speed: str, safe: str, features:
     assert not found.robot.multi_arm
 
 
-def test_a_robot_with_several_arms() -> None:
+def test_robots_with_several_arms_are_analysed() -> None:
     found = analyse("""
         from arcor2_hw.data.robot import RobotType
         class T(MultiArmRobot):
@@ -951,8 +951,8 @@ def test_twenty_types_are_analysed_within_a_tenth_of_a_second() -> None:
 
 
 def _duration(sources: list[SourceFile]) -> float:
-    began = time.process_time()
+    start = time.process_time()
     lib = Library(sources)
     for name in lib.names():
         assert lib.analyse(name).problem is None
-    return time.process_time() - began
+    return time.process_time() - start

@@ -112,7 +112,7 @@ def test_category_and_icon_come_from_the_class(library: Library) -> None:
     assert (robot.category, robot.icon) == ("Robots", "robot")
 
 
-def test_older_types_may_use_these_names_otherwise(library: Library) -> None:
+def test_older_types_may_use_these_names_for_other_attributes(library: Library) -> None:
     old = library.analyse("Old")
     assert old.problem is None
     assert (old.meta.category, old.meta.icon) == (UNSET, UNSET)

@@ -54,22 +54,22 @@ def test_all_installed_types_are_restored_without_parsing_in_any_order(monkeypat
 
 
 CHANGES: dict[str, Callable[[Path], object]] = {
-    "its own source": lambda vendor: (vendor / "arm.py").write_text(NEIGHBOURS["vendor/arm.py"] + "\n"),
-    "a module it imports": lambda vendor: (vendor / "limits.py").write_text("TOP = 0.125\n"),
-    "a module that was missing": lambda vendor: (vendor / "extra.py").write_text("EXTRA = 1\n"),
-    "a module is gone": lambda vendor: (vendor / "limits.py").unlink(),
+    "source of the type": lambda vendor: (vendor / "arm.py").write_text(NEIGHBOURS["vendor/arm.py"] + "\n"),
+    "imported module": lambda vendor: (vendor / "limits.py").write_text("TOP = 0.125\n"),
+    "module that was missing": lambda vendor: (vendor / "extra.py").write_text("EXTRA = 1\n"),
+    "removed module": lambda vendor: (vendor / "limits.py").unlink(),
 }
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
-def test_a_change_of_any_file_is_noticed(vendor: Path, change: Callable[[Path], object]) -> None:
+def test_a_change_of_any_file_invalidates_the_snapshot(vendor: Path, change: Callable[[Path], object]) -> None:
     stored = snapshot.take(library(vendor))
     assert snapshot.restore(library(vendor), stored)
     change(vendor)
     assert not snapshot.restore(library(vendor), stored)
 
 
-def test_an_added_source_is_noticed(vendor: Path) -> None:
+def test_an_added_source_invalidates_the_snapshot(vendor: Path) -> None:
     stored = snapshot.take(library(vendor))
     more = library(vendor)
     more.add(SourceFile("Late", "late", "class Late: ...\n"))

@@ -25,7 +25,7 @@ _SIZES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 BALL = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
 TRIANGLES_OF_BALL = 20_480
 MAX_OF_BALL = 13_856
-"""For the 0.173 m from corner to corner of the box around it."""
+"""Largest number of triangles of the ball, whose bounding box has a diagonal of 0.173 m."""
 
 
 class Glb:
@@ -66,20 +66,20 @@ def prepare(tmp_path: Path, content: bytes | str, name: str) -> tuple[PreparedAs
 
 
 def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
-    made = mesh.export(file_type=kind)
-    return made if isinstance(made, bytes) else str(made).encode()
+    content = mesh.export(file_type=kind)
+    return content if isinstance(content, bytes) else str(content).encode()
 
 
 # ------------------------------------------------------------------------------------------------ one mesh
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off", "dae", "glb"])
 def test_a_fine_sphere_is_simplified_in_every_file_format(kind: str, tmp_path: Path) -> None:
-    made, steps = prepare(tmp_path, exported(BALL, kind), f"ball.{kind}")
-    assert (made.before, made.triangles) == (TRIANGLES_OF_BALL, MAX_OF_BALL)
-    ball = Glb(made.content).meshes["mesh"]
-    assert len(ball["indices"]) == 3 * made.triangles
+    asset, steps = prepare(tmp_path, exported(BALL, kind), f"ball.{kind}")
+    assert (asset.before, asset.triangles) == (TRIANGLES_OF_BALL, MAX_OF_BALL)
+    ball = Glb(asset.content).meshes["mesh"]
+    assert len(ball["indices"]) == 3 * asset.triangles
     radii = np.linalg.norm(ball["POSITION"], axis=1)
     assert np.abs(radii - 0.05).max() < 0.1e-3
-    assert len(ball["POSITION"]) < 0.6 * made.triangles, "its vertices are shared"
+    assert len(ball["POSITION"]) < 0.6 * asset.triangles, "its vertices are shared"
     lengths = radii * np.linalg.norm(ball["NORMAL"], axis=1)
     off = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", ball["NORMAL"], ball["POSITION"]) / lengths, -1, 1)))
     assert off.max() < 3.0
@@ -88,9 +88,9 @@ def test_a_fine_sphere_is_simplified_in_every_file_format(kind: str, tmp_path: P
 
 
 def test_a_box_keeps_its_twelve_triangles_and_its_edges(tmp_path: Path) -> None:
-    made, _ = prepare(tmp_path, exported(trimesh.creation.box((0.2, 0.4, 0.6)), "stl"), "box.stl")
-    box = Glb(made.content).meshes["mesh"]
-    assert made.triangles == 12
+    asset, _ = prepare(tmp_path, exported(trimesh.creation.box((0.2, 0.4, 0.6)), "stl"), "box.stl")
+    box = Glb(asset.content).meshes["mesh"]
+    assert asset.triangles == 12
     assert len(box["POSITION"]) == 24, "each corner belongs to three sides"
     corners = box["POSITION"][box["indices"].reshape(-1, 3)]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -99,8 +99,8 @@ def test_a_box_keeps_its_twelve_triangles_and_its_edges(tmp_path: Path) -> None:
 
 
 def test_a_cylinder_keeps_a_round_side_and_flat_ends(tmp_path: Path) -> None:
-    made, _ = prepare(tmp_path, exported(trimesh.creation.cylinder(0.1, 0.5, sections=96), "ply"), "pin.ply")
-    pin = Glb(made.content).meshes["mesh"]
+    asset, _ = prepare(tmp_path, exported(trimesh.creation.cylinder(0.1, 0.5, sections=96), "ply"), "pin.ply")
+    pin = Glb(asset.content).meshes["mesh"]
     upright = np.abs(pin["NORMAL"][:, 2])
     assert set(np.round(upright, 2)) == {0.0, 1.0}
     side = upright < 0.5
@@ -117,8 +117,8 @@ def test_a_small_mesh_gets_fewer_triangles_than_a_large_one() -> None:
 def test_units_and_up_axis_of_the_file_are_applied(tmp_path: Path) -> None:
     box = exported(trimesh.creation.box((100.0, 200.0, 300.0)), "dae").decode()
     box = box.replace("<up_axis>Y_UP</up_axis>", '<unit meter="0.001"/><up_axis>Y_UP</up_axis>')
-    made, _ = prepare(tmp_path, box, "box.dae")
-    glb = Glb(made.content)
+    asset, _ = prepare(tmp_path, box, "box.dae")
+    glb = Glb(asset.content)
     assert np.allclose(np.ptp(glb.meshes["mesh"]["POSITION"], axis=0), (0.1, 0.3, 0.2))
     # Other programs use y up, and rotate the model at the root node.
     assert np.allclose(glb.json["nodes"][0]["rotation"], (-np.sqrt(0.5), 0, 0, np.sqrt(0.5)))
@@ -126,7 +126,7 @@ def test_units_and_up_axis_of_the_file_are_applied(tmp_path: Path) -> None:
 
 # ------------------------------------------------------------------------------------------------ colours
 def painted() -> trimesh.Trimesh:
-    """A ball, red above and grey below."""
+    """Return a ball that is red above and grey below."""
     ball: trimesh.Trimesh = BALL.copy()
     above = ball.triangles_center[:, 2:] > 0
     colours = np.where(above, [[200, 30, 30, 255]], [[128, 128, 128, 255]]).astype(np.uint8)
@@ -136,9 +136,9 @@ def painted() -> trimesh.Trimesh:
 
 def test_simplification_keeps_face_colours_in_place(tmp_path: Path) -> None:
     content = exported(painted(), "ply")
-    made, _ = prepare(tmp_path, content, "ball.ply")
-    ball = Glb(made.content).meshes["mesh"]
-    assert made.triangles <= MAX_OF_BALL
+    asset, _ = prepare(tmp_path, content, "ball.ply")
+    ball = Glb(asset.content).meshes["mesh"]
+    assert asset.triangles <= MAX_OF_BALL
     red, grey = linear_of((np.array(((200, 30, 30), (128, 128, 128))) / 255).astype(np.float32))
     height = ball["POSITION"][:, 2]
     assert np.allclose(ball["COLOR_0"][height > 0.004, :3], red, atol=1e-3)
@@ -152,8 +152,8 @@ def test_collada_materials_become_colours_except_default_grey(tmp_path: Path) ->
     black = exported(box, "dae").decode()
     assert "COLOR_0" not in Glb(prepare(tmp_path, black, "box.dae")[0].content).meshes["mesh"]
     diffuse = re.compile(r"(<diffuse>\s*<color>)[^<]*")
-    made, _ = prepare(tmp_path, diffuse.sub(r"\g<1>0.0392 0.7843 0.0392 1.0", black), "box.dae")
-    colours = Glb(made.content).meshes["mesh"]["COLOR_0"]
+    asset, _ = prepare(tmp_path, diffuse.sub(r"\g<1>0.0392 0.7843 0.0392 1.0", black), "box.dae")
+    colours = Glb(asset.content).meshes["mesh"]["COLOR_0"]
     green = linear_of((np.array((10, 200, 10)) / 255).astype(np.float32))
     assert np.allclose(colours[:, :3], green, atol=4e-3)
 
@@ -169,7 +169,7 @@ def test_triangles_of_two_colours_share_an_edge_without_a_gap() -> None:
     assert drawn.colours is not None
     assert {tuple(each) for each in drawn.colours.tolist()} == {(65535, 0, 0, 65535), (0, 0, 65535, 65535)}
     of_triangle = drawn.colours[drawn.triangles]
-    assert (of_triangle == of_triangle[:, :1]).all(), "no triangle is of two colours"
+    assert (of_triangle == of_triangle[:, :1]).all(), "no triangle has two colours"
     whole = trimesh.Trimesh(drawn.positions, drawn.triangles, process=False)
     whole.merge_vertices(merge_norm=True)
     assert whole.is_watertight
@@ -208,8 +208,8 @@ def boxy(urdf: str = URDF) -> bytes:
 
 
 def test_a_robot_has_a_description_and_one_mesh_per_visual_file(tmp_path: Path) -> None:
-    made, _ = prepare(tmp_path, boxy(), "boxy.zip")
-    glb = Glb(made.content)
+    asset, _ = prepare(tmp_path, boxy(), "boxy.zip")
+    glb = Glb(asset.content)
     assert glb.extras["urdf"] == URDF
     assert glb.extras["meshes"] == {
         "package://boxy/meshes/base.stl": "boxy/meshes/base.stl",
@@ -222,8 +222,8 @@ def test_a_robot_has_a_description_and_one_mesh_per_visual_file(tmp_path: Path) 
     assert set(glb.extras["problems"]) == {"meshes/broken.stl", "meshes/gone.stl"}
     assert "broken.stl" in glb.extras["problems"]["meshes/broken.stl"]
     assert "gone.stl is missing" in glb.extras["problems"]["meshes/gone.stl"]
-    assert made.problems == list(glb.extras["problems"].values())
-    assert made.before == TRIANGLES_OF_BALL + 12
+    assert asset.problems == list(glb.extras["problems"].values())
+    assert asset.before == TRIANGLES_OF_BALL + 12
 
 
 def test_the_meshes_of_a_robot_share_one_triangle_budget(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -235,9 +235,9 @@ def test_the_meshes_of_a_robot_share_one_triangle_budget(tmp_path: Path, monkeyp
     )
     ball = exported(BALL, "stl")
     files = {f"{name}_dot_stl": ball for name in names}
-    made, _ = prepare(tmp_path, packed(r_dot_urdf=f'<robot name="r">{links}</robot>', **files), "r.zip")
-    assert made.before == 4 * TRIANGLES_OF_BALL
-    assert 19_000 <= made.triangles <= 20_000
+    asset, _ = prepare(tmp_path, packed(r_dot_urdf=f'<robot name="r">{links}</robot>', **files), "r.zip")
+    assert asset.before == 4 * TRIANGLES_OF_BALL
+    assert 19_000 <= asset.triangles <= 20_000
 
 
 def test_a_robot_of_primitive_shapes_needs_no_mesh_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -277,7 +277,7 @@ def test_a_missing_mesh_is_named(tmp_path: Path) -> None:
         prepared(PrepareAsset(StoredFile(str(tmp_path / "none"), "gone.stl")), WorkerState(lambda *_: None))
 
 
-def test_the_tag_depends_only_on_the_content(tmp_path: Path) -> None:
-    """The cache tag depends on the sources of the asset, not on the time."""
+def test_the_prepared_file_depends_only_on_the_asset(tmp_path: Path) -> None:
+    """The file contains no times, so that its cache tag depends only on the asset."""
     content = exported(painted(), "ply")
     assert prepare(tmp_path, content, "a.ply")[0].content == prepare(tmp_path, content, "a.ply")[0].content

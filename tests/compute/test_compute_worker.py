@@ -28,30 +28,30 @@ from arcor2_server.compute.workers import Compute
 KNOWN = [Position(0, 0, 0), Position(1, 0, 0), Position(0, 1, 0), Position(1, 1, 0)]
 
 
-def question(offset: float = 0.25) -> t.FrameByPoints:
-    """Compute a frame whose origin is at (offset, 0, 0)."""
+def frame_task(offset: float = 0.25) -> t.FrameByPoints:
+    """Return a task that computes a frame with the origin (offset, 0, 0), m."""
     return t.FrameByPoints(KNOWN, [point + Position(offset, 0, 0) for point in KNOWN])
 
 
 @pytest_asyncio.fixture
 async def compute() -> AsyncIterator[Compute]:
-    made = Compute(idle=60.0)
-    yield made
-    await made.close()
+    created = Compute(idle=60.0)
+    yield created
+    await created.close()
 
 
-async def until(condition: object, patience: float = 20.0) -> None:
+async def until(condition: object, timeout: float = 20.0) -> None:
     assert callable(condition)
-    async with asyncio.timeout(patience):
+    async with asyncio.timeout(timeout):
         while not condition():
             await asyncio.sleep(0.01)
 
 
 async def test_a_worker_starts_on_first_use_and_is_reused(compute: Compute) -> None:
     assert compute.pid(WorkerKind.CALIBRATION) is None
-    assert (await compute.run(question())).pose.position.x == pytest.approx(0.25)
+    assert (await compute.run(frame_task())).pose.position.x == pytest.approx(0.25)
     pid = compute.pid(WorkerKind.CALIBRATION)
-    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+    assert (await compute.run(frame_task(0.5))).pose.position.x == pytest.approx(0.5)
     assert compute.pid(WorkerKind.CALIBRATION) == pid
     assert compute.pid(WorkerKind.KINEMATICS) is None
 
@@ -59,23 +59,23 @@ async def test_a_worker_starts_on_first_use_and_is_reused(compute: Compute) -> N
 async def test_an_idle_worker_ends_and_restarts_on_demand() -> None:
     compute = Compute(idle=0.2)
     try:
-        await compute.run(question())
+        await compute.run(frame_task())
         pid = compute.pid(WorkerKind.CALIBRATION)
         assert pid is not None
         await until(lambda: compute.pid(WorkerKind.CALIBRATION) is None)
         await until(lambda: not psutil.pid_exists(pid))
-        assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+        assert (await compute.run(frame_task(0.5))).pose.position.x == pytest.approx(0.5)
     finally:
         await compute.close()
 
 
 async def test_a_killed_worker_fails_only_the_running_task(compute: Compute) -> None:
-    await compute.run(question())
+    await compute.run(frame_task())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)  # it will be in the middle of the next task
-    hit = asyncio.create_task(compute.run(question(1.0)))
-    waiting = [asyncio.create_task(compute.run(question(float(each)))) for each in (2, 3)]
+    hit = asyncio.create_task(compute.run(frame_task(1.0)))
+    waiting = [asyncio.create_task(compute.run(frame_task(float(each)))) for each in (2, 3)]
     await asyncio.sleep(0.1)
     os.kill(pid, signal.SIGKILL)
     with pytest.raises(ComputeStopped, match=r"was killed by SIGKILL while it worked on a frame by touch") as raised:
@@ -86,24 +86,24 @@ async def test_a_killed_worker_fails_only_the_running_task(compute: Compute) -> 
 
 
 async def test_killing_an_idle_worker_fails_no_task(compute: Compute) -> None:
-    await compute.run(question())
+    await compute.run(frame_task())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGKILL)
     await until(lambda: compute.pid(WorkerKind.CALIBRATION) is None)
-    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+    assert (await compute.run(frame_task(0.5))).pose.position.x == pytest.approx(0.5)
 
 
 async def test_a_frozen_worker_is_replaced(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
-    await compute.run(question())
+    await compute.run(frame_task())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     monkeypatch.setattr(process, "START_TIMEOUT", 0.3)
     os.kill(pid, signal.SIGSTOP)
     with pytest.raises(ComputeTimeout, match=r"Took longer than 0\.1 s, and was cancelled: a frame by touch"):
-        await compute.run(question(), within=0.1)
+        await compute.run(frame_task(), within=0.1)
     monkeypatch.undo()
-    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+    assert (await compute.run(frame_task(0.5))).pose.position.x == pytest.approx(0.5)
     assert compute.pid(WorkerKind.CALIBRATION) != pid
 
 
@@ -120,9 +120,9 @@ async def test_an_endless_task_is_ended_at_its_deadline(compute: Compute, monkey
     """The kernel enforces the deadline, also for a library call that never returns."""
     monkeypatch.setattr(process, "COMMAND", ("-P", "-c", ENDLESS))
     with pytest.raises(ComputeTimeout, match=r"longer than 0\.2 s"):
-        await compute.run(question(), within=0.2)
+        await compute.run(frame_task(), within=0.2)
     monkeypatch.undo()
-    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+    assert (await compute.run(frame_task(0.5))).pose.position.x == pytest.approx(0.5)
 
 
 NONSENSE = """
@@ -135,18 +135,18 @@ print("a library says why")
 async def test_a_worker_that_sends_garbage_is_ended(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process, "COMMAND", ("-P", "-c", NONSENSE))
     with pytest.raises(ComputeStopped) as raised:
-        await compute.run(question())
+        await compute.run(frame_task())
     assert "a library says why" in raised.value.detail
     monkeypatch.undo()
-    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+    assert (await compute.run(frame_task(0.5))).pose.position.x == pytest.approx(0.5)
 
 
 async def test_a_cancelled_caller_does_not_block_the_others(compute: Compute) -> None:
-    await compute.run(question())
+    await compute.run(frame_task())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)
-    tasks = [asyncio.create_task(compute.run(question(float(each)))) for each in range(3)]
+    tasks = [asyncio.create_task(compute.run(frame_task(float(each)))) for each in range(3)]
     await asyncio.sleep(0.05)
     for each in tasks[:2]:  # one that is being worked on, and one that waits
         each.cancel()
@@ -157,20 +157,20 @@ async def test_a_cancelled_caller_does_not_block_the_others(compute: Compute) ->
 
 
 async def test_background_tasks_wait_for_all_others(compute: Compute) -> None:
-    await compute.run(question())
+    await compute.run(frame_task())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)
     order: list[str] = []
 
-    async def ask(name: str, background: bool) -> None:
-        await compute.run(question(), background=background)
+    async def run(name: str, background: bool) -> None:
+        await compute.run(frame_task(), background=background)
         order.append(name)
 
-    tasks = [asyncio.create_task(ask("first", False))]
+    tasks = [asyncio.create_task(run("first", False))]
     await asyncio.sleep(0.05)
     for name, background in (("back 1", True), ("back 2", True), ("front", False)):
-        tasks.append(asyncio.create_task(ask(name, background)))
+        tasks.append(asyncio.create_task(run(name, background)))
     await asyncio.sleep(0.05)
     os.kill(pid, signal.SIGCONT)
     await asyncio.gather(*tasks)
@@ -179,7 +179,7 @@ async def test_background_tasks_wait_for_all_others(compute: Compute) -> None:
 
 async def test_too_many_waiting_tasks_are_refused(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compute_module, "MAX_WAITING", 2)
-    tasks = [asyncio.create_task(compute.run(question())) for _ in range(3)]
+    tasks = [asyncio.create_task(compute.run(frame_task())) for _ in range(3)]
     await asyncio.sleep(0)
     # the first has not been taken yet
     with pytest.raises(ComputeBusy, match="2 computations are already waiting"):
@@ -208,7 +208,7 @@ def test_an_unknown_error_becomes_its_nearest_known_base() -> None:
 
 async def test_large_pictures_do_not_block_the_server(compute: Compute) -> None:
     """Forty megabytes are sent in pieces, so the server continues meanwhile."""
-    await compute.run(question())
+    await compute.run(frame_task())
     picture = b"no picture" * 4_000_000
     ticks = 0
 
@@ -229,11 +229,11 @@ async def test_large_pictures_do_not_block_the_server(compute: Compute) -> None:
 
 async def test_closing_ends_a_busy_worker() -> None:
     compute = Compute(idle=60.0)
-    await compute.run(question())
+    await compute.run(frame_task())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)
-    tasks = [asyncio.create_task(compute.run(question())) for _ in range(2)]
+    tasks = [asyncio.create_task(compute.run(frame_task())) for _ in range(2)]
     await asyncio.sleep(0.05)
     await compute.close()
     assert not psutil.pid_exists(pid)
@@ -241,13 +241,13 @@ async def test_closing_ends_a_busy_worker() -> None:
         with pytest.raises(ComputeStopped, match="server is ending"):
             await each
     with pytest.raises(ComputeStopped):
-        await compute.run(question())
+        await compute.run(frame_task())
 
 
 async def test_a_worker_ends_with_its_server() -> None:
     process = await ComputeProcess.start(WorkerKind.CALIBRATION)
     try:
-        await process.compute(question(), 10.0, None, None)
+        await process.compute(frame_task(), 10.0, None, None)
         process._writer.transport.abort()  # as when the server was killed
         async with asyncio.timeout(20):
             assert await process.process.wait() == 0

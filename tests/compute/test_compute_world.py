@@ -37,10 +37,10 @@ DOWN = Orientation(1, 0, 0, 0)
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def compute() -> AsyncIterator[Compute]:
-    made = Compute(idle=60.0)
-    await made.run(t.DescribeRobot(RobotSource(UR5E)))
-    yield made
-    await made.close()
+    created = Compute(idle=60.0)
+    await created.run(t.DescribeRobot(RobotSource(UR5E)))
+    yield created
+    await created.close()
 
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -68,9 +68,9 @@ async def test_forward_and_inverse_kinematics_agree(compute: Compute) -> None:
     target = base * Pose(Position(0.4, 0.2, 0.3), DOWN)
     solve = t.SolveInverse("arm", "tcp", target)
     joints = await compute.run(solve, world=world(robot(base)))
-    there = await forward(compute, joints, base)
-    assert there.position.distance_to(target.position) < 1e-6
-    assert there.orientation.angle_to(target.orientation) < 1e-5
+    reached = await forward(compute, joints, base)
+    assert reached.position.distance_to(target.position) < 1e-6
+    assert reached.orientation.angle_to(target.orientation) < 1e-5
     # Close to the start there are other joint values that reach the same pose.
     start = [Joint(joint.name, joint.value + 0.05) for joint in joints]
     near = await compute.run(t.SolveInverse("arm", "tcp", target, start), world=world(robot(base)))
@@ -175,8 +175,8 @@ async def test_joint_values_are_checked(compute: Compute) -> None:
     assert names[5] in str(found[1].reason)
     assert found[2].reach in (Reach.IN_COLLISION, Reach.NEAR_LIMIT)
     assert found[3].reach is Reach.UNKNOWN
-    there = (await forward(compute, up)).position
-    found = await compute.run(judge, world=world(robot(), box("crate", *there, 0.1, 0.1, 0.1)))
+    reached = (await forward(compute, up)).position
+    found = await compute.run(judge, world=world(robot(), box("crate", *reached, 0.1, 0.1, 0.1)))
     assert found[0].reach is Reach.IN_COLLISION
 
 
@@ -194,7 +194,7 @@ PYRAMID = b"""solid pyramid
 ) + b"endsolid pyramid\n"  # fmt: skip
 
 
-async def line(compute: Compute, *things: WorldItem, ignore: tuple[str, ...] = ()) -> str | None:
+async def first_hit(compute: Compute, *things: WorldItem, ignore: tuple[str, ...] = ()) -> str | None:
     check = t.CheckLines([t.Line(Position(-2, 0.2, 0.2), Position(2, 0.2, 0.2))], ignore=list(ignore))
     (hit,) = await compute.run(check, world=world(*things))
     return None if hit is None else hit.id
@@ -206,14 +206,14 @@ async def test_lines_hit_bodies(compute: Compute, tmp_path: Path) -> None:
     mesh = WorldBody("tent", MeshShape(StoredFile(str(stl), "tent.stl")), Pose())
     ball = WorldBody("ball", Sphere(0.3), Pose(Position(-1.2, 0.2, 0.2)))
     can = WorldBody("can", Cylinder(0.1, 1.0), Pose(Position(-1.8, 0.2, 0.2)))
-    assert await line(compute) is None
-    assert await line(compute, mesh) == "tent"
-    assert await line(compute, mesh, ball) == "ball"
-    assert await line(compute, mesh, ball, can) == "can"
-    assert await line(compute, mesh, ball, can, ignore=("can", "ball")) == "tent"
-    assert await line(compute, ball, ignore=("ball",)) is None
+    assert await first_hit(compute) is None
+    assert await first_hit(compute, mesh) == "tent"
+    assert await first_hit(compute, mesh, ball) == "ball"
+    assert await first_hit(compute, mesh, ball, can) == "can"
+    assert await first_hit(compute, mesh, ball, can, ignore=("can", "ball")) == "tent"
+    assert await first_hit(compute, ball, ignore=("ball",)) is None
     small = WorldBody("tent", MeshShape(StoredFile(str(stl), "tent.stl"), (0.1, 0.1, 0.1)), Pose())
-    assert await line(compute, small) is None
+    assert await first_hit(compute, small) is None
     facts = await compute.run(t.ReadMesh(StoredFile(str(stl), "tent.stl"), (2.0, 1.0, 1.0)))
     assert (facts.triangles, facts.size) == (4, (2.0, 1.0, 1.0))
 
@@ -224,11 +224,11 @@ async def test_an_unusable_mesh_is_named_until_it_is_removed(compute: Compute, t
     tent = WorldBody("tent", MeshShape(StoredFile(str(bad), "tent.stl")), Pose())
     for _ in range(2):
         with pytest.raises(InvalidData, match=r"tent\.stl") as raised:
-            await line(compute, tent)
+            await first_hit(compute, tent)
         assert raised.value.code == "bad_mesh"
-    assert await line(compute) is None
+    assert await first_hit(compute) is None
     with pytest.raises(InvalidData, match=r"gone\.stl"):
-        await line(compute, WorldBody("gone", MeshShape(StoredFile(str(tmp_path / "gone"), "gone.stl")), Pose()))
+        await first_hit(compute, WorldBody("gone", MeshShape(StoredFile(str(tmp_path / "gone"), "gone.stl")), Pose()))
 
 
 async def test_a_gripped_part_moves_with_the_robot(compute: Compute) -> None:
@@ -240,21 +240,21 @@ async def test_a_gripped_part_moves_with_the_robot(compute: Compute) -> None:
     in_link = await compute.run(t.PlaceInLink(model, joints, "tcp", part))
     held = WorldBody("part", Box(0.05, 0.05, 0.05), in_link, Attachment("arm", "tcp"))
 
-    async def met(joints: list[Joint]) -> str | None:
+    async def hit_body(joints: list[Joint]) -> str | None:
         where = (await forward(compute, joints)) * in_link
         away = Position(0, 0.04, 0)  # next to the arm itself
         check = t.CheckLines([t.Line(where.position + away, where.position)], ignore=["arm"])
         (hit,) = await compute.run(check, world=world(robot(joints=joints), held))
         return None if hit is None else hit.id
 
-    assert await met(joints) == "part"
+    assert await hit_body(joints) == "part"
     moved = [Joint(joint.name, joint.value + 0.4) for joint in joints]
-    assert await met(moved) == "part"
+    assert await hit_body(moved) == "part"
     # The robot is recreated with another tool: its gripped part is at the same pose on the same link.
     longer = WorldRobot("arm", RobotSource(UR5E, settings={"tcp_z": 0.2}), joints)
     check = t.CheckLines([t.Line(part.position + Position(0, 0.04, 0), part.position)], ignore=["arm"])
     assert await compute.run(check, world=world(longer, held)) == [None]
-    assert await met(joints) == "part"
+    assert await hit_body(joints) == "part"
     with pytest.raises(NotFound, match="attached to arm"):
         await compute.run(check, world=world(held))
     with pytest.raises(NotFound, match="no link 'nose'"):
@@ -264,16 +264,16 @@ async def test_a_gripped_part_moves_with_the_robot(compute: Compute) -> None:
 async def test_a_restarted_worker_receives_the_world_again() -> None:
     compute = Compute(idle=60.0)
     crate = box("crate", 0, 0.2, 0.2, 0.2, 0.2, 0.2)
-    assert await line(compute, crate, robot(Pose(Position(0, 3, 0)))) == "crate"
+    assert await first_hit(compute, crate, robot(Pose(Position(0, 3, 0)))) == "crate"
     pid = compute.pid(WorkerKind.KINEMATICS)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)
-    task = asyncio.create_task(line(compute, crate))
+    task = asyncio.create_task(first_hit(compute, crate))
     await asyncio.sleep(0.05)
     os.kill(pid, signal.SIGKILL)
     with pytest.raises(ComputeStopped, match="the safety of a line"):
         await task
-    assert await line(compute, crate) == "crate"
+    assert await first_hit(compute, crate) == "crate"
     assert compute.pid(WorkerKind.KINEMATICS) not in (None, pid)
     await compute.close()
 
@@ -289,12 +289,12 @@ async def test_only_differences_of_a_large_world_are_sent(compute: Compute, monk
 
     monkeypatch.setattr(ComputeProcess, "_send", count)
     things = [box(f"b{n}", n % 10 + 3.0, n // 10 % 10, n // 100, 0.2, 0.2, 0.2) for n in range(1000)]
-    assert await line(compute, *things) is None
+    assert await first_hit(compute, *things) is None
     for number in range(20):
         things[number] = box(f"b{number}", number % 10 + 4.0, 50.0, 0.0, 0.2, 0.2, 0.2)
-        assert await line(compute, *things) is None
+        assert await first_hit(compute, *things) is None
     assert sent == [1000] + [1] * 20
-    assert await line(compute) is None
+    assert await first_hit(compute) is None
 
 
 async def test_a_mesh_of_two_gigabytes_is_refused_without_reading(compute: Compute, tmp_path: Path) -> None:

@@ -129,8 +129,8 @@ def test_the_measured_extra_time_of_motions_is_added() -> None:
     found = predict(program(moves, measured=measured))
     assert [span.duration for span in found.trace.spans] == pytest.approx([0.2, planned + 0.2, planned + 0.2], abs=5e-3)
     # After an edit, the addition of the method is still known.
-    again = predict(program({"a": line(0.5, 0.1), "b": line(0.5, -0.1)}, additions={LINE: 0.2}))
-    assert again.trace.spans[1].duration == pytest.approx(trapezoid_time(0.2, 0.5, 2.5) + 0.2, abs=5e-3)
+    edited = predict(program({"a": line(0.5, 0.1), "b": line(0.5, -0.1)}, additions={LINE: 0.2}))
+    assert edited.trace.spans[1].duration == pytest.approx(trapezoid_time(0.2, 0.5, 2.5) + 0.2, abs=5e-3)
 
 
 def test_a_safe_motion_goes_around_an_obstacle() -> None:
@@ -177,4 +177,4 @@ def test_branches_of_parallel_work_start_together_and_the_longest_counts() -> No
     assert [outer[key] for key in ("both", "call fetch", "measure", "run")] == ["", "both", "call test", "call fetch"]
     lanes = {span.action_id: span.lane for span in found.trace.spans}
     assert [lanes[key] for key in ("report", "close", "run")] == [UNSET, "call test", "call fetch"]
-    assert {each.action_id for each in found.durations} == set(seconds), "calls have no duration of their own"
+    assert {each.action_id for each in found.durations} == set(seconds), "calls have no separate duration"

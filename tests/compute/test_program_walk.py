@@ -13,8 +13,8 @@ def graph(edges: dict[str, list[str]], **more: object) -> Graph:
     return Graph(steps, **more)  # type: ignore[arg-type]
 
 
-def names(made: Graph, first: int = 0) -> str:
-    return " ".join(made.steps[visit.step].action_id for visit in walk(made, first).visits)
+def names(program: Graph, first: int = 0) -> str:
+    return " ".join(program.steps[visit.step].action_id for visit in walk(program, first).visits)
 
 
 BRANCHED = {"a": ["b", "c"], "b": ["d"], "c": ["d"], "d": ["END"]}
@@ -32,12 +32,12 @@ def test_without_runs_the_first_branch_is_taken_and_named() -> None:
 
 def test_the_branch_of_the_newest_run_is_taken_unless_the_client_asks_for_another() -> None:
     usual = {"a": UsualBranch(7, "c")}
-    made = graph(BRANCHED, usual=usual)
-    assert names(made) == "a c d"
-    assert walk(made).assumptions[0].text == "After A, the branch leads to C, as most often in run 7."
-    asked = graph(BRANCHED, usual=usual, wanted={"a": "b"})
-    assert names(asked) == "a b d"
-    assert walk(asked).assumptions[0].text == "After A, the requested branch leads to B."
+    program = graph(BRANCHED, usual=usual)
+    assert names(program) == "a c d"
+    assert walk(program).assumptions[0].text == "After A, the branch leads to C, as most often in run 7."
+    requested = graph(BRANCHED, usual=usual, wanted={"a": "b"})
+    assert names(requested) == "a b d"
+    assert walk(requested).assumptions[0].text == "After A, the requested branch leads to B."
     # A run of an older version took a branch that no longer exists.
     assert names(graph(BRANCHED, usual={"a": UsualBranch(7, "gone")})) == "a b d"
 
@@ -59,7 +59,7 @@ def test_the_usual_branch_is_the_most_frequent_one() -> None:
 
 def test_branches_of_parallel_work_and_functions_are_walked() -> None:
     end = [Edge(END_STEP)]
-    made = Graph(
+    program = Graph(
         [
             Step("both", "Both", "", end, branches=[1, 2]),
             Step("call a", "Call a", "", end, function="a"),
@@ -70,7 +70,7 @@ def test_branches_of_parallel_work_and_functions_are_walked() -> None:
         ],
         functions={"a": 3, "b": 5},
     )
-    visits = walk(made).visits
-    assert [made.steps[visit.step].action_id for visit in visits] == ["both", "call a", "a1", "a2", "call b", "b1"]
+    visits = walk(program).visits
+    assert [program.steps[visit.step].action_id for visit in visits] == ["both", "call a", "a1", "a2", "call b", "b1"]
     assert [visit.call for visit in visits] == [OUTSIDE, 0, 1, 1, 0, 4]
     assert [visit.lane for visit in visits] == ["", "call a", "call a", "call a", "call b", "call b"]
