@@ -116,5 +116,5 @@ async def test_a_package_runs_as_it_was_built(client: Client) -> None:
 
 def test_drivers_and_packages_find_every_name_that_they_import() -> None:
     names = (RECORDED / "imported_names.json").read_text()
-    asked = subprocess.run([sys.executable, "-c", IMPORT_ALL, names], capture_output=True, text=True, check=True)
-    assert json.loads(asked.stdout) == []
+    result = subprocess.run([sys.executable, "-c", IMPORT_ALL, names], capture_output=True, text=True, check=True)
+    assert json.loads(result.stdout) == []

@@ -20,7 +20,7 @@ def section(title: str) -> str:
 
 
 def keys(title: str) -> set[str]:
-    """The keys in the first column of the table of a section."""
+    """Return the keys in the first column of the table of a section."""
     rows = re.findall(r"^\| ([^|]*`[^|]*) \|", section(title), re.MULTILINE)
     return {key for row in rows for key in re.findall(r"`(\w+)`", row)}
 

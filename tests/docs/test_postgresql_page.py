@@ -22,7 +22,7 @@ COMMANDS = [shlex.split(line) for line in re.findall(r"^\$ (.*)$", PAGE, re.MULT
 
 
 @pytest.mark.sqlite
-async def test_the_commands_of_the_page(
+async def test_the_commands_of_the_page_create_a_database_and_copy_documents(
     tmp_path: Path, databases: Databases, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     url = server()

@@ -13,7 +13,7 @@ import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
 ELSEWHERE = ("install", "postgresql")
-"""Pages whose commands need another environment; tests of their own execute them."""
+"""Pages whose commands need another environment. Separate tests execute them."""
 TUTORIALS = sorted(
     path
     for folder in ("tutorials", "how-to")
@@ -25,12 +25,12 @@ TIMEOUT = 150  # s, of a command; one runs the conformance suite, on a busy mach
 
 
 def expected(lines: list[str]) -> re.Pattern[str]:
-    """A pattern that the output must contain: `...` matches anything."""
+    """Return a pattern that the output must contain. `...` matches anything."""
     return re.compile(".*?".join(".*?".join(map(re.escape, line.split("..."))) for line in lines), re.DOTALL)
 
 
 def commands(text: str) -> Iterator[tuple[str, list[str]]]:
-    """The commands of a console block, each with the lines printed after it."""
+    """Yield the commands of a console block, each with the lines printed after it."""
     command, printed = "", []
     for line in text.splitlines():
         if line.startswith("$ "):
@@ -80,11 +80,11 @@ class Background:
 
 
 @pytest.mark.parametrize("tutorial", TUTORIALS, ids=lambda path: path.stem)
-def test_tutorial(tutorial: Path, tmp_path: Path) -> None:
+def test_commands_of_a_tutorial_print_the_stated_output(tutorial: Path, tmp_path: Path) -> None:
     environment = dict(
         os.environ,
         PATH=f"{Path(sys.executable).parent}:{os.environ['PATH']}",
-        # Of the installed plugins, a user has only ours: the others need several seconds.
+        # Load only the plugin of this project, as for a user. Other installed plugins take seconds to load.
         PYTEST_DISABLE_PLUGIN_AUTOLOAD="1",
         PYTEST_PLUGINS="arcor2_hw.testing.plugin",
     )
