@@ -22,7 +22,7 @@ from arcor2_hw.testing.tcp_wire import TcpWire
 from tests.fakes.conftest import FakeProcess
 
 ROOT = Path(__file__).resolve().parents[2]
-PLACES = [ROOT, *(ROOT / each for each in ("drivers", "fakes", "server"))]
+SOURCE_FOLDERS = [ROOT, *(ROOT / each for each in ("drivers", "fakes", "server"))]
 CANNOT_BE_GUESSED = {
     "cancelling_leaves_the_line_usable",
     "capabilities_work",
@@ -72,7 +72,10 @@ def run(folder: Path, cell: list[dict[str, object]], *arguments: str) -> str:
     (folder / "my_cell.yaml").write_bytes(msgspec.yaml.encode({"devices": cell}))
     (folder / "pytest.ini").write_text("[pytest]\n")
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "COV_"))}
-    environment |= {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONPATH": os.pathsep.join(map(str, [folder, *PLACES]))}
+    environment |= {
+        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+        "PYTHONPATH": os.pathsep.join(map(str, [folder, *SOURCE_FOLDERS])),
+    }
     command = [sys.executable, "-m", "pytest", "-q", "-rs", "-p", "arcor2_hw.testing.plugin", "-p", "no:cacheprovider"]
     command += ["--pyargs", "arcor2_hw.testing", *(["--device", "my_cell.yaml"] if cell else []), *arguments]
     ended = subprocess.run(

@@ -139,7 +139,7 @@ def claims(**changes: Any) -> Quality:
     return Quality(**(given | changes))
 
 
-def written(tmp_path: Path, **changes: Any) -> None:
+def write_report(tmp_path: Path, **changes: Any) -> None:
     distribution, version = origin(TYPE)
     given = {
         "device": "tester",
@@ -160,7 +160,7 @@ def written(tmp_path: Path, **changes: Any) -> None:
 
 
 def test_a_matching_report_reaches_gold(tmp_path: Path) -> None:
-    written(tmp_path)
+    write_report(tmp_path)
     assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == []
 
 
@@ -180,15 +180,15 @@ def test_a_matching_report_reaches_gold(tmp_path: Path) -> None:
     ],
 )
 def test_differences_of_a_report_are_named(tmp_path: Path, changes: dict[str, Any], problem: str) -> None:
-    written(tmp_path, **changes)
+    write_report(tmp_path, **changes)
     assert problem in "; ".join(report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED))
 
 
-def test_a_report_is_of_the_very_files_of_the_driver(tmp_path: Path) -> None:
+def test_a_report_is_valid_only_for_unchanged_files_of_the_driver(tmp_path: Path) -> None:
     (tmp_path / "press.py").write_text("FORCE = 100\n")
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "press.stl").write_bytes(b"solid")
-    written(tmp_path)
+    write_report(tmp_path)
     (tmp_path / "__pycache__").mkdir()
     for name in ("quality.yaml", "first_day.yaml", "__pycache__/press.pyc", "evidence/notes.txt"):
         (tmp_path / name).write_text("anything")
@@ -205,7 +205,7 @@ def test_a_report_is_of_the_very_files_of_the_driver(tmp_path: Path) -> None:
 
 def test_a_recording_belongs_to_its_report(tmp_path: Path) -> None:
     recording = report.Recording("wire.jsonl.gz", hashlib.sha256(b"bytes").hexdigest())
-    written(tmp_path, recording=recording)
+    write_report(tmp_path, recording=recording)
     missing = report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED)
     assert missing == ["the recording wire.jsonl.gz cannot be read: No such file or directory"]
     for content, problem in ((b"bytes", []), (b"Bytes", ["the recording wire.jsonl.gz is not the one of the report"])):
@@ -215,15 +215,15 @@ def test_a_recording_belongs_to_its_report(tmp_path: Path) -> None:
 
 def test_a_case_that_the_real_device_could_not_show_needs_a_reason(tmp_path: Path) -> None:
     cases = {case: CaseResult(Kind.PASSED) for case in ALL_PASSED}
-    written(tmp_path, cases=cases | {"stop_passes": CaseResult(Kind.NOT_RUN, "declined")})
+    write_report(tmp_path, cases=cases | {"stop_passes": CaseResult(Kind.NOT_RUN, "declined")})
     reason = {"stop_passes": "the guard was not mounted yet"}
     assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == ["stop_passes is not run there"]
     assert report.unmatched(tmp_path, claims(not_on_hardware=reason), TYPE, ALL_PASSED) == []
-    written(tmp_path, cases=cases | {"stop_passes": CaseResult(Kind.FAILED, "went on")})
+    write_report(tmp_path, cases=cases | {"stop_passes": CaseResult(Kind.FAILED, "went on")})
     assert report.unmatched(tmp_path, claims(not_on_hardware=reason), TYPE, ALL_PASSED) == [
         "stop_passes is failed there"
     ]
-    written(tmp_path)
+    write_report(tmp_path)
     recovery = claims(not_on_hardware={"half_a_frame": "the line cannot be interrupted"})
     assert report.unmatched(tmp_path, recovery, TYPE, ALL_PASSED) == ["half_a_frame has to pass on the real device"]
     with pytest.raises(ValueError, match="not_on_hardware: stop_passes needs a reason in words"):

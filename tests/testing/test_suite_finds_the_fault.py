@@ -31,7 +31,7 @@ def test_presses_that_hold_and_continue_as_declared_pass(tmp_path: Path) -> None
     assert "4 passed, " in output, output
 
 
-def test_there_is_a_broken_driver_for_each_case() -> None:
+def test_each_case_has_a_broken_driver() -> None:
     assert set(map(case_of, BROKEN)) == Conformance.cases()
 
 
@@ -41,7 +41,7 @@ def test_there_is_a_broken_driver_for_each_case() -> None:
         ([f"test_toy.py::TestBroken::test_{case_of(name)}[{name}]" for name in BROKEN], ()),
         pytest.param(["test_toy.py::TestBroken"], ("-pxdist", "-n4", "--dist=load"), marks=pytest.mark.matrix),
     ],
-    ids=["its case", "all cases"],
+    ids=["one case", "all cases"],
 )
 def test_each_broken_driver_fails_only_its_case(tmp_path: Path, cases: list[str], options: tuple[str, ...]) -> None:
     selection = (*cases, *options, "--phases=1", "-rfE", "--tb=short")

@@ -8,7 +8,7 @@ import pytest
 from arcor2_hw.testing.time_limit import CallHangs, within
 from tests.testing.toy_suite import failed, run
 
-FOR_EVER = """
+HANGING_METHOD = """
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from broken.toy_press import ToyBench, ToyPress
@@ -57,7 +57,7 @@ def test_a_case_that_hangs_fails_by_name_and_the_next_one_runs(tmp_path: Path) -
 
 
 def test_while_a_call_hangs_the_other_cases_of_its_device_fail_and_those_of_others_run(tmp_path: Path) -> None:
-    conftest = FOR_EVER.format(type="ToyPress", method="_nobody")
+    conftest = HANGING_METHOD.format(type="ToyPress", method="_nobody")
     selected = "not TestReactions and (connecting_to_a_silent_device or silence_in_a_call)"
     output = run(tmp_path, "-rA", selected=selected, conftest=conftest, cases=["stop_passes"])
     assert "ToyPress: the case connecting_to_a_silent_device has not ended within 2 s: ToyPress.connect()" in output
@@ -66,7 +66,7 @@ def test_while_a_call_hangs_the_other_cases_of_its_device_fail_and_those_of_othe
 
 
 def test_a_disconnect_that_hangs_is_named(tmp_path: Path) -> None:
-    hangs = FOR_EVER.format(type="ToyPress", method="_end").replace("never(self, timeout)", "never(self, thread)")
+    hangs = HANGING_METHOD.format(type="ToyPress", method="_end").replace("never(self, timeout)", "never(self, thread)")
     output = run(tmp_path, selected="TestToy and readings_can_be_read", conftest=hangs)
     assert "1 error in" in output
     assert "ToyPress: disconnecting after the case readings_can_be_read has not ended within 10 s: Toy" in output
@@ -74,7 +74,7 @@ def test_a_disconnect_that_hangs_is_named(tmp_path: Path) -> None:
 
 
 def test_a_bench_that_does_not_start_fails_its_cases(tmp_path: Path) -> None:
-    hangs = FOR_EVER.format(type="ToyBench", method="start").replace("never(self, timeout)", "never(self)")
+    hangs = HANGING_METHOD.format(type="ToyBench", method="start").replace("never(self, timeout)", "never(self)")
     output = run(tmp_path, selected="TestToy and (readings_can_be_read or described)", conftest=hangs)
     assert failed(output) == ["described", "readings_can_be_read"]
     assert "ToyPress: the start of the bench has not ended within 2 s" in output

@@ -12,7 +12,7 @@ from arcor2_hw.testing import declarations
 
 ROOT = LIBRARY.parent
 DRIVERS = sorted({Path(each.folder) for each in declarations.drivers()})
-OURS = [LIBRARY, ROOT / "server" / "arcor2_server", *DRIVERS]
+FOLDERS = [LIBRARY, ROOT / "server" / "arcor2_server", *DRIVERS]
 DRIVER = '''
 from arcor2_hw.exceptions import DeviceTimeout, Refused
 from arcor2_hw.messages import Message
@@ -59,7 +59,7 @@ def test_every_template_gets_the_values_of_its_fields() -> None:
 
 
 def test_all_texts_for_users_are_templates() -> None:
-    files = [path for folder in OURS for path in sources(folder) if path.relative_to(folder).parts[0] not in ENGLISH]
+    files = [path for folder in FOLDERS for path in sources(folder) if path.relative_to(folder).parts[0] not in ENGLISH]
     assert hard_coded(files) == []
 
 
@@ -114,7 +114,7 @@ def test_a_file_is_named_by_its_language(tmp_path: Path) -> None:
     assert [name for name in ("cs", "pt-BR", "CS", "../cs", "czech") if is_language(name)] == ["cs", "pt-BR"]
 
 
-def test_texts_of_the_type_are_known_too() -> None:
+def test_texts_include_those_of_the_object_type() -> None:
     scale = next(each for each in declarations.drivers() if each.name == "MtSicsScale")
     assert scale.file is not None
     known = texts(Path(scale.folder))
@@ -133,9 +133,9 @@ def test_extraction_keeps_translations_and_removes_unused_ones(tmp_path: Path) -
     assert list(content) == sorted(content)
 
 
-@pytest.mark.parametrize("folder", OURS, ids=lambda folder: folder.name)
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 @pytest.mark.parametrize("language", ["cs", "de"])
-def test_our_texts_are_translated(folder: Path, language: str) -> None:
+def test_texts_of_the_project_are_translated(folder: Path, language: str) -> None:
     """A fault is fixed by `python -m arcor2_hw.analysis.extraction FOLDER`, and by translating the new texts."""
     found, known = read(file_of(folder, language)), texts(folder)
     assert sorted(known - set(found)) == []

@@ -151,9 +151,9 @@ def test_a_connection_in_progress_is_reset_too(
     connect = socket.create_connection
 
     def connect_and_reset(*arguments: Any) -> socket.socket:
-        made = connect(*arguments)
+        connection = connect(*arguments)
         wire.reset()
-        return made
+        return connection
 
     monkeypatch.setattr(socket, "create_connection", connect_and_reset)
     with pytest.raises(ConnectionResetError), connect((wire.host, wire.ports[0]), 5.0) as driver:
@@ -242,7 +242,7 @@ def test_an_invalid_frame_counts_as_acting() -> None:
         assert "invalid Modbus" in frames.acting(b"\xff\xfe\xfd")
 
 
-def test_lines_act_by_their_first_word() -> None:
+def test_the_first_word_decides_whether_a_line_acts() -> None:
     frames = Lines(["LON", "RST"])
     assert frames.split(b"STAT\rLON 5\r\nVER\r") == [b"STAT", b"LON 5", b"VER"]
     assert [frames.acting(each) for each in (b"STAT", b"LON 5", b"PLON")] == ["", "LON 5", ""]
@@ -261,7 +261,7 @@ def test_lines_act_by_their_first_word() -> None:
         ("O", ""),
     ],
 )
-def test_canopen_acts_by_nmt_process_data_and_downloads(line: str, words: str) -> None:
+def test_nmt_process_data_and_downloads_count_as_acting(line: str, words: str) -> None:
     assert CanopenSlcan(["0x1017"]).acting(line.encode()) == words
 
 
@@ -270,7 +270,7 @@ def test_an_unknown_kind_of_frames_is_named() -> None:
         reader("morse", [])
 
 
-def test_the_ports_of_a_ur_controller_are_read() -> None:
+def test_frames_of_a_ur_controller_are_read() -> None:
     reader = Rtde(["programState"])
     asked, started, inputs, data = b"\0\5V\0\2", b"\0\3S", b"\0\6Ia,b", b"\0\5U\1\7"
     assert reader.split(asked + started + inputs + data + b"\0") == [asked, started, inputs, data, b"\0"]
