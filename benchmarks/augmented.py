@@ -11,10 +11,10 @@ from arcor2_server.web.editor import FILES
 from benchmarks.metrics import Metric, Report, median, percentile
 from tests.editor import texts
 from tests.editor.ar_probe import overlay_errors
-from tests.editor.camera_video import CAMERA, MIDDLE, marker_table, write_video
+from tests.editor.camera_video import CAMERA_ARGUMENTS, MIDDLE, marker_table, write_video
 from tests.editor.screen import Screen, running_browser, screen_of
 from tests.editor.test_editor_ar import DARKEN
-from tests.editor.test_editor_size import AR_WAYS, ar_size
+from tests.editor.test_editor_size import AR_MODES, ar_size
 
 STARTS: Final = 3
 PICTURES: Final = 60
@@ -34,24 +34,24 @@ _IN_VIEW: Final = """(n) => {
     const at = found[n % found.length]?.screen;
     return at && [left + at.x, top + at.y];
 }"""
-"""Return where one of the items in view is drawn."""
+"""Return the page position of one of the visible items."""
 
 
 def size(report: Report) -> None:
     """Measure the size of the files that each AR mode loads when it starts, compressed with gzip."""
     manifest = json.loads((FILES / ".vite" / "manifest.json").read_text())
-    sizes = {way: ar_size(FILES, manifest, way) for way in AR_WAYS}
-    note = "most that a device loads; " + ", ".join(f"{way} {total / 1e3:.1f} kB" for way, total in sizes.items())
+    sizes = {mode: ar_size(FILES, manifest, mode) for mode in AR_MODES}
+    note = "most that a device loads; " + ", ".join(f"{mode} {total / 1e3:.1f} kB" for mode, total in sizes.items())
     report.add(Metric("ar_size_kb", max(sizes.values()) / 1e3, len(sizes), note))
 
 
 async def augmented(report: Report, directory: Path, url: str) -> None:
-    """Measure registration, accuracy and latency in a browser of its own; the project stays open."""
+    """Measure registration, accuracy and latency in a separate browser; the project stays open."""
     video = directory / "camera.mjpeg"
     shots = write_video(video)
     table = json.dumps(marker_table())
     starts = []
-    async with running_browser(*CAMERA, f"--use-file-for-fake-video-capture={video}") as browser:
+    async with running_browser(*CAMERA_ARGUMENTS, f"--use-file-for-fake-video-capture={video}") as browser:
         for number in range(STARTS):
             async with screen_of(browser, url, "ipad", drawn=True) as screen:
                 await screen.page.route("**/api/calibration/markers", lambda route: route.fulfill(body=table))
@@ -78,8 +78,8 @@ async def augmented(report: Report, directory: Path, url: str) -> None:
                 regained = [await _regain(screen) for _ in range(STARTS)]
     report.add(Metric("ar_registration_s", max(starts), STARTS, "worst, with an unknown lens"))
     report.add(Metric("ar_regained_s", max(regained), STARTS, "worst, after dark pictures"))
-    for way, times in selected.items():
-        report.add(Metric(f"select_ar_{way}_ms", median(times), len(times), f"1 tap; worst {max(times):.0f} ms"))
+    for method, times in selected.items():
+        report.add(Metric(f"select_ar_{method}_ms", median(times), len(times), f"1 tap; worst {max(times):.0f} ms"))
     for name, errors in (("near", near), ("aside", aside)):
         note = f"p95; p50 {1e3 * median(errors):.2f} mm"
         report.add(Metric(f"ar_{name}_mm", 1e3 * percentile(errors, 95), len(errors), note))
@@ -93,12 +93,12 @@ async def _select(screen: Screen) -> dict[str, list[float]]:
     select = page.get_by_role("group", name=texts.AT_CROSSHAIR).get_by_role("button", name=re.compile("^Select ."))
     took: dict[str, list[float]] = {"crosshair": [], "tap": []}
     for number in range(SELECTED):
-        for way, times in took.items():
+        for method, times in took.items():
             await screen.close_panels()
             await select.wait_for()
             x, y = await screen.until(_IN_VIEW, number)
             began = time.perf_counter()
-            if way == "tap":
+            if method == "tap":
                 await page.mouse.click(x, y)
             else:
                 await select.click()

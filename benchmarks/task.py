@@ -19,10 +19,10 @@ from arcor2_hw.data.project import Project
 from benchmarks.metrics import Metric, Report
 from tests.e2e.harness import Cell, running_cell, scene_state, until
 from tests.editor import texts
-from tests.editor.camera_video import CAMERA, marker_table, write_video
+from tests.editor.camera_video import CAMERA_ARGUMENTS, marker_table, write_video
 from tests.editor.reset import START
 from tests.editor.screen import running_browser, screen_of
-from tests.editor.test_editor_first_hour import Counting, is_at, tool_height
+from tests.editor.test_editor_first_hour import CountedUser, is_at, tool_height
 
 DIRECTIONS: Final = "+−++++"
 """Directions along Z of the axis steps to the points: above the feeder, board, above the tester, tester, both trays."""
@@ -53,7 +53,7 @@ _HIDDEN: Final = """(control) => {
 }"""
 
 
-class Worker(Counting):
+class Worker(CountedUser):
     """A user who scrolls a panel before tapping a control outside its visible part; scrolls are counted separately."""
 
     scrolls = 0
@@ -65,10 +65,10 @@ class Worker(Counting):
 
 
 async def task(report: Report, directory: Path) -> None:
-    """Do the task once in each view, with a server, fakes and a browser of its own."""
+    """Do the task once in each view, with a separate server, fakes and browser."""
     video = directory / "task.mjpeg"
     write_video(video)
-    camera = (*CAMERA, f"--use-file-for-fake-video-capture={video}")
+    camera = (*CAMERA_ARGUMENTS, f"--use-file-for-fake-video-capture={video}")
     async with running_cell(directory / "task") as cell, running_browser(*camera) as browser:
         client = await cell.client("colleague")
         scene, _ = await cell.open(client)

@@ -1,4 +1,4 @@
-"""What the AR view draws, compared with the true pose of the fake camera."""
+"""Errors of the AR overlay, compared with the true pose of the fake camera."""
 
 from typing import Any, Final
 
@@ -27,9 +27,9 @@ _PROBE: Final = """([points, bits, field]) => {
 
 
 async def overlay_errors(screen: Screen, shots: list[Shot], points: list[tuple[float, float, float]]) -> list[float]:
-    """Return how far from their true places the shown picture and 3D view put points, m at their distance.
+    """Return the distance between the drawn and the true position of each point, m, measured at the point's depth.
 
-    The list is empty while the camera is not registered.
+    Return an empty list while the camera is not registered.
     """
     seen: dict[str, Any] | None = await screen.page.evaluate(_PROBE, [points, BITS, FIELD])
     if seen is None:

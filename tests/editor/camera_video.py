@@ -22,15 +22,16 @@ MARKERS: Final = {10: (0.0, 0.0, 0.0), 11: (0.38, 0.05, 0.4)}
 MIDDLE: Final = (0.19, 0.025, 0.0)
 """Point between the markers."""
 FIELD: Final = 16
-"""Side of a field of the picture's number in its upper left corner, pixels."""
+"""Side of the squares that encode the frame number in the upper left corner of a frame, pixels."""
 BITS: Final = 8
-CAMERA: Final = (
+"""Number of these squares, one for each bit."""
+CAMERA_ARGUMENTS: Final = (
     "--use-fake-ui-for-media-stream",
     "--use-fake-device-for-media-stream",
     "--disable-gpu-memory-buffer-video-frames",
 )
-_FINER: Final = 2
-"""Pictures are drawn this much larger and then reduced."""
+_SUPERSAMPLING: Final = 2
+"""Supersampling factor. Frames are drawn larger by this factor and then reduced."""
 _MARGIN: Final = 40
 _BLACK: Final = 240
 """Margin and black square of the drawing of a marker, pixels."""
@@ -76,13 +77,13 @@ def marker_table() -> dict[str, Any]:
 
 
 def write_video(file: Path, pictures: int = 40) -> list[Shot]:
-    """Write a video as MJPEG and return the pose of each of its pictures, whose numbers are drawn into them."""
+    """Write an MJPEG video with the frame number drawn into each frame, and return the camera pose of each frame."""
     random = np.random.default_rng(3)
     shots, stream = [], b""
     for number in range(pictures):
         part = number / (pictures - 1)
         angle, distance = -2.2 + 1.4 * part, 0.6 + 0.5 * part
-        shot = looking(np.array(MIDDLE) + distance * np.array([0.7 * np.cos(angle), 0.7 * np.sin(angle), 0.7]))
+        shot = look_at(np.array(MIDDLE) + distance * np.array([0.7 * np.cos(angle), 0.7 * np.sin(angle), 0.7]))
         drawn = _drawn(shot, random)
         for bit in range(BITS):
             drawn[:FIELD, bit * FIELD : (bit + 1) * FIELD] = 255 if number >> bit & 1 else 0
@@ -99,7 +100,7 @@ def picture_url(shot: Shot, seed: int = 3) -> str:
     return f"data:image/png;base64,{base64.b64encode(picture).decode()}"
 
 
-def looking(eye: Array, lens: Lens = Lens(), at: tuple[float, float, float] = MIDDLE) -> Shot:
+def look_at(eye: Array, lens: Lens = Lens(), at: tuple[float, float, float] = MIDDLE) -> Shot:
     """Return the shot of a camera that looks at a point, by default at the middle of the markers, upright."""
     forward = (np.array(at) - eye) / np.linalg.norm(np.array(at) - eye)
     right = np.cross(forward, [0, 0, 1])
@@ -110,7 +111,7 @@ def looking(eye: Array, lens: Lens = Lens(), at: tuple[float, float, float] = MI
 
 def _drawn(shot: Shot, random: np.random.Generator) -> npt.NDArray[np.uint8]:
     width, height = shot.lens.width, shot.lens.height
-    size = (width * _FINER, height * _FINER)
+    size = (width * _SUPERSAMPLING, height * _SUPERSAMPLING)
     coarse = random.normal(125, 14, (height // 20, width // 20)).astype(np.float32)
     picture = cv2.resize(coarse, size, interpolation=cv2.INTER_CUBIC)
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
@@ -123,7 +124,7 @@ def _drawn(shot: Shot, random: np.random.Generator) -> npt.NDArray[np.uint8]:
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         world = np.column_stack([corners @ turn.T + (x, y), np.zeros(4)])
         # Pixel centres have whole coordinates, in the fine picture too.
-        seen = ((shot.project(world)[0] + 0.5) * _FINER - 0.5).astype(np.float32)
+        seen = ((shot.project(world)[0] + 0.5) * _SUPERSAMPLING - 0.5).astype(np.float32)
         edge = side - 0.5
         drawn = np.array([[-0.5, -0.5], [edge, -0.5], [edge, edge], [-0.5, edge]], np.float32)
         to = cv2.getPerspectiveTransform(drawn, seen)

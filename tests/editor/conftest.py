@@ -30,8 +30,8 @@ def sizes(pytestconfig: pytest.Config) -> list[str]:
 
 @pytest_asyncio.fixture(scope="package", loop_scope="session")
 async def browser() -> AsyncIterator[Browser]:
-    """The browser of this worker while it runs editor tests. Screens open at once have contexts of their own."""
-    async with running_browser(behind=True, reusing=True) as running:
+    """The browser of this worker while it runs editor tests. Each open screen has its own browser context."""
+    async with running_browser(low_priority=True, reuse_contexts=True) as running:
         yield running
 
 

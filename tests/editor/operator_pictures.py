@@ -22,7 +22,7 @@ from tests.e2e.harness import until
 from tests.editor.screen import Screen, running_browser, screen_of
 
 BOARDS, SEED = 12, 3
-SLOW: Final = 40.0
+STEP_TIMEOUT: Final = 40.0
 """Time limit of each step, s."""
 
 
@@ -33,11 +33,11 @@ class Operator:
         self._cell, self._client, self._screen, self._to = cell, client, screen, to
         self._parts = screen.page.get_by_role("region", name="Parts in the cell")
         self._names: dict[str, str] = {}
-        """The actions by their ids."""
+        """Action names by id."""
         self._held = screen.page.get_by_role("region", name="The program is held")
 
     async def all(self) -> None:
-        """Run the program, with one fault after the other."""
+        """Run the program, and resolve one fault after the other."""
         await self._start()
         await self._labels_out()
         await self._protective_stop()
@@ -46,38 +46,38 @@ class Operator:
         await self._nest_occupied()
 
     async def _labels_out(self) -> None:
-        await self._at("into_nest")
+        await self._wait_for_action("into_nest")
         await self._cell.command("printer", "media", labels=0)
-        await self._is_held()
-        await self._take("labels-out")
+        await self._wait_until_held()
+        await self._screenshot("labels-out")
         await self._cell.command("printer", "media", labels=100)
         await self._try_again()
 
     async def _protective_stop(self) -> None:
-        await self._at("insert")
+        await self._wait_for_action("insert")
         await self._cell.command("robot", "protective_stop")
-        await self._is_held()
+        await self._wait_until_held()
         await expect(self._held.get_by_role("button", name="Acknowledge")).to_be_visible()
-        await self._take("protective-stop")
+        await self._screenshot("protective-stop")
         await self._acknowledge()
         await self._try_again()
 
     async def _door_open(self) -> None:
-        await self._at("test")
-        await self._state_of_tester("Execute")
+        await self._wait_for_action("test")
+        await self._wait_for_tester("Execute")
         await self._cell.command("tester", "push_door", opening=True)
-        await self._is_held()
+        await self._wait_until_held()
         await expect(self._held.get_by_role("button", name="Acknowledge")).to_be_visible()
-        await self._take("door-open")
+        await self._screenshot("door-open")
         await self._cell.command("tester", "push_door", opening=False)
         await self._acknowledge()
         await self._try_again()
 
     async def _killed_in_mid_pick(self) -> None:
-        await self._at("pick")
+        await self._wait_for_action("pick")
         await self._cell.kill("host")
         await expect(self._parts).to_contain_text("Where is part")
-        await self._take("killed")
+        await self._screenshot("killed")
         await self._confirm_parts()
         await self._parts.get_by_role("button", name="Do not continue").click()
 
@@ -85,12 +85,12 @@ class Operator:
         """Start the program from its beginning, with a board in the nest."""
         if "tester" not in {board["place"] for board in await self._cell.boards()}:
             await self._start()
-            await self._at("test")
+            await self._wait_for_action("test")
             await self._screen.press("Stop")
             await expect(self._screen.page.get_by_role("button", name="Start", exact=True)).to_be_visible()
         await self._start()
-        await self._is_held("is occupied")
-        await self._take("nest-occupied")
+        await self._wait_until_held("is occupied")
+        await self._screenshot("nest-occupied")
 
     # -------------------------------------------------------------------------------- steps
     async def _start(self) -> None:
@@ -98,13 +98,13 @@ class Operator:
         await expect(self._screen.page.get_by_role("button", name="Stop", exact=True)).to_be_visible()
 
     async def _confirm_parts(self) -> None:
-        """Answer where each part is. One in the gripper is taken out."""
+        """Answer where each part is. Take out a part that is in the gripper."""
         await self._screen.settle()
         while question := re.search(
             r"Where is part (\S+)\?", await self._parts.inner_text() if await self._parts.count() else ""
         ):
             boards = {board["code"]: board["place"] for board in await self._cell.boards()}
-            place = boards.get(question[1]) or "stop"  # without a code, it has not been read
+            place = boards.get(question[1]) or "stop"  # a part whose code has not been read has none
             answer = NAMES[place]
             if place == "gripper":
                 await self._cell.command("world", "remove_board", code=question[1])
@@ -112,75 +112,75 @@ class Operator:
             await self._parts.get_by_role("button", name=answer, exact=True).click()
             await expect(self._parts.get_by_text(question[0])).to_have_count(0)
 
-    async def _at(self, action: str) -> None:
-        """Wait until the program starts an action, from now on."""
+    async def _wait_for_action(self, action: str) -> None:
+        """Discard the events received so far, and wait until the program starts an action."""
         with contextlib.suppress(DeviceTimeout):
             while event := await self._client.next_event(timeout=0.05):
-                self._see(event)
-        async with asyncio.timeout(3.0 * SLOW):
+                self._read_action_names(event)
+        async with asyncio.timeout(3.0 * STEP_TIMEOUT):
             while True:
                 with contextlib.suppress(DeviceTimeout):
                     event = await self._client.next_event(timeout=1.0)
-                    self._see(event)
+                    self._read_action_names(event)
                     if event.event == "ActionStateBefore" and self._names.get(event.data.action_id) == action:
                         return
                 if await self._held.count():  # another effect of the last fault
                     await self._acknowledge()
                     await self._try_again()
 
-    def _see(self, event: Any) -> None:
+    def _read_action_names(self, event: Any) -> None:
         if event.event == "PackageInfo":
             self._names = {each.id: each.name for each in event.data.project.all_actions()}
 
-    async def _state_of_tester(self, wanted: str) -> None:
+    async def _wait_for_tester(self, wanted: str) -> None:
         async def reached() -> bool:
             return bool((await self._cell.command("tester", "truth"))["state"] == wanted)
 
-        await until(reached, f"the tester to be in {wanted}", SLOW)
+        await until(reached, f"the tester to be in {wanted}", STEP_TIMEOUT)
 
-    async def _is_held(self, text: str = "") -> None:
-        await expect(self._held).to_contain_text(text or "Held", timeout=SLOW * 1000)
+    async def _wait_until_held(self, text: str = "") -> None:
+        await expect(self._held).to_contain_text(text or "Held", timeout=STEP_TIMEOUT * 1000)
 
     async def _acknowledge(self) -> None:
-        """Acknowledge all alarms of the held device. One that ends meanwhile needs nothing."""
+        """Acknowledge all alarms of the held device. Skip those that end meanwhile."""
         button = self._held.get_by_role("button", name="Acknowledge").first
-        async with asyncio.timeout(SLOW):
+        async with asyncio.timeout(STEP_TIMEOUT):
             while await button.count():
                 with contextlib.suppress(Error):
                     await button.click(timeout=3000)
                 await asyncio.sleep(0.5)
 
     async def _try_again(self) -> None:
-        """Press until it is accepted: it is refused while the device is not connected again."""
+        """Press the button until the server accepts. It refuses until the device is connected again."""
         page = self._screen.page
         dialog = page.get_by_role("alertdialog").or_(page.get_by_role("dialog"))
-        async with asyncio.timeout(SLOW):
+        async with asyncio.timeout(STEP_TIMEOUT):
             while True:
-                await self._dismiss()
+                await self._dismiss_notices()
                 await self._held.get_by_role("button", name=re.compile("^(Try again|Continue)$")).click()
-                await self._answered()
+                await self._wait_for_answer()
                 if await dialog.count():
                     await dialog.get_by_role("button", name="Try again").click()
-                    await self._answered()
+                    await self._wait_for_answer()
                 if not await page.locator(".notice.error").count():
                     break
                 await asyncio.sleep(0.5)
 
-    async def _answered(self) -> None:
+    async def _wait_for_answer(self) -> None:
         """Wait until the screen asks, the decision is refused, or the program continues."""
         answered = "() => document.querySelector('[role$=dialog], .notice.error') || !document.querySelector('.held')"
         with contextlib.suppress(Error):  # another effect of the fault may hold the program at once
             await self._screen.page.wait_for_function(answered, timeout=3000)
 
-    async def _dismiss(self) -> None:
+    async def _dismiss_notices(self) -> None:
         for each in await self._screen.page.locator(".notices").get_by_role("button", name="Dismiss").all():
             with contextlib.suppress(Error):  # it has disappeared by itself
                 await each.click(timeout=1000)
 
-    async def _take(self, name: str) -> None:
+    async def _screenshot(self, name: str) -> None:
         await expect(self._screen.page.get_by_text("for the editor")).to_have_count(0)  # models are prepared
-        await self._dismiss()
-        await self._screen.page.mouse.move(0, 0)  # off the buttons, which are marked under it
+        await self._dismiss_notices()
+        await self._screen.page.mouse.move(0, 0)  # away from the buttons, which are highlighted under the pointer
         await self._screen.settle()
         (self._to / f"recover-{name}.png").write_bytes(await self._screen.page.screenshot())
 
@@ -193,12 +193,12 @@ async def main(to: Path) -> None:
         await cell.start()
         try:
             async with (
-                running_browser(behind=True) as browser,
+                running_browser(low_priority=True) as browser,
                 Client(cell.url, "Ada", reconnect=False) as client,
                 screen_of(browser, cell.url, "ipad", touch=True, drawn=True) as screen,
             ):
                 await client.subscribe_events({"Held", "ProgramPosition"})
-                screen.page.set_default_timeout(SLOW * 1000)
+                screen.page.set_default_timeout(STEP_TIMEOUT * 1000)
                 await screen.join("Olga", "/?q=low#/operator?kiosk")
                 await Operator(cell, client, screen, to).all()
         finally:

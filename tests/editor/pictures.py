@@ -21,12 +21,12 @@ from tests.editor.screen import Screen, running_browser, screen_of
 
 SEED: Final = 3
 
-SLOW: Final = 240_000
+STEP_TIMEOUT: Final = 240_000
 """Timeout of each step, ms: without a graphics card, a frame in high quality takes up to seconds."""
 
 
-async def _come_in(screen: Screen) -> None:
-    screen.page.set_default_timeout(SLOW)
+async def _join(screen: Screen) -> None:
+    screen.page.set_default_timeout(STEP_TIMEOUT)
     await screen.page.goto(f"{screen.url}/?q=high")
     await screen.page.get_by_label(texts.YOUR_NAME).fill("Ada")
     await screen.press(texts.JOIN)
@@ -37,7 +37,7 @@ async def _come_in(screen: Screen) -> None:
         await screen.page.wait_for_function("() => window.__engine?.ids().length > 20")
 
 
-async def _rest(screen: Screen) -> None:
+async def _wait_until_drawn(screen: Screen) -> None:
     """Wait until everything is loaded and drawn."""
     await screen.page.wait_for_function(
         """() => {
@@ -56,12 +56,12 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
         page = screen.page
 
         async def take(name: str) -> None:
-            await _rest(screen)
+            await _wait_until_drawn(screen)
             (to / f"editor-{name}.png").write_bytes(await page.screenshot())
 
-        await _come_in(screen)
+        await _join(screen)
         # The view becomes the thumbnail of the project when it is saved.
-        await _rest(screen)
+        await _wait_until_drawn(screen)
         async with Client(at["url"].replace("http", "ws", 1), "Carl", reconnect=False) as client:
             project = (await client.call("ListProjects"))[0].id
             description = rpc.UpdateProjectDescriptionArgs(project, "Test boards, and sort them.")
@@ -85,7 +85,7 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
         graph = page.get_by_role("region", name=texts.GRAPH)
         await page.get_by_role("radio", name="Flow", exact=True).click()
         await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
-        await _rest(screen)
+        await _wait_until_drawn(screen)
         await graph.get_by_role("button", name=texts.SELECT_SEVERAL).click()
         for name in ("into_nest", "out_of_nest"):
             await graph.locator(f'.react-flow__node[aria-label^="{name},"]').click()
@@ -99,7 +99,7 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
 
 
 async def _open_function(screen: Screen, call: str, name: str) -> None:
-    """Open a function from the panel of a call of it, which the search finds."""
+    """Find a call of a function with the search, and open the function from the panel of the call."""
     page = screen.page
     await page.keyboard.press("/")
     search = page.get_by_role("dialog", name="Find a command or an object")
@@ -115,18 +115,18 @@ async def _open_function(screen: Screen, call: str, name: str) -> None:
 async def _operator(browser: Browser, run: Run, to: Path) -> None:
     """Take the operator's screen while the program runs, with the first board in its box."""
     async with screen_of(browser, run.at()["url"], drawn=True) as screen:  # type: ignore[index]
-        screen.page.set_default_timeout(SLOW)
+        screen.page.set_default_timeout(STEP_TIMEOUT)
         await screen.join("Olga", "/?q=low#/operator")
-        await expect(screen.page.get_by_role("region", name="This run")).to_contain_text("Good1", timeout=SLOW)
+        await expect(screen.page.get_by_role("region", name="This run")).to_contain_text("Good1", timeout=STEP_TIMEOUT)
         await screen.page.get_by_role("button", name=texts.STOP, exact=True).wait_for()
         (to / "editor-operator.png").write_bytes(await screen.page.screenshot())
 
 
-async def _lists(browser: Browser, run: Run, to: Path) -> None:
+async def _home(browser: Browser, run: Run, to: Path) -> None:
     at = run.at()
     assert at is not None
     async with screen_of(browser, at["url"], drawn=True) as screen:
-        await _come_in(screen)
+        await _join(screen)
         await screen.page.get_by_role("button", name=texts.GO_OFFLINE).click()
         await screen.page.get_by_role("button", name=texts.GO_ONLINE).wait_for()
         await screen.press(texts.CLOSE_DOCUMENT)
@@ -144,7 +144,7 @@ async def _phone(browser: Browser, run: Run, to: Path) -> None:
         await screen.page.wait_for_function("() => window.__engine?.ids().length > 20")
         tools = screen.page.get_by_role("navigation")
         await tools.get_by_role("button", name=texts.POINTS, exact=True).click()
-        await _rest(screen)
+        await _wait_until_drawn(screen)
         (to / "editor-phone.png").write_bytes(await screen.page.screenshot())
 
 
@@ -158,7 +158,7 @@ async def main(to: Path) -> None:
             await until(lambda: "The server runs at" in run.output, "the demo to serve", 600)
             await _tablet(browser, run, to)
             await _phone(browser, run, to)
-            await _lists(browser, run, to)
+            await _home(browser, run, to)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""For tests of the program: a project open on a screen, and a second client that uses the protocol."""
+"""An open project on a screen, and a second client that uses the protocol, for tests of programming."""
 
 import contextlib
 import re
@@ -23,7 +23,7 @@ from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
 @dataclass
 class Work:
-    """A project on a screen, and a second client, "colleague". `taps` counts what `tool` and `tap_button` did."""
+    """A project on a screen, and a second client, "colleague". `taps` counts the taps of `tool` and `tap_button`."""
 
     cell: Cell
     client: Client
@@ -48,7 +48,7 @@ class Work:
         return self.screen.page.get_by_role("complementary")
 
     async def start(self) -> None:
-        """Open a fresh copy of the project, with the screen as every test finds it: offline, 3D view, panels closed."""
+        """Open a fresh copy of the project, and reset the screen: offline, 3D view, panels closed."""
         await self.screen.page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
         self.copies += 1
         name = f"{self.original.name} {self.copies}"
@@ -105,14 +105,14 @@ class Work:
         await self.panel.get_by_role("heading", name=name, exact=True).wait_for()
 
     async def next_event(self, name: str, wanted: Any = lambda event: True) -> Event:
-        """Return the next event of that name that is wanted, as the second client receives it."""
+        """Return the next event of this name that the second client receives and for which `wanted` is true."""
         while True:
             event = await self.client.next_event(name)
             if wanted(event):
                 return event
 
     async def add(self, name: str, kind: str, point: str, *results: str, **values: ActionParameter) -> str:
-        """Add an action by the protocol. `kind` is `<object>/<action>`, `results` are names of its results."""
+        """Add an action through the protocol. `kind` is `<object>/<action>`, `results` are names of its results."""
         owner, _, method = kind.partition("/")
         flows, parameters = [Flow(FlowTypes.DEFAULT, list(results))], list(values.values())
         args = rpc.AddActionArgs(self.point(point), name, f"{self.object(owner)}/{method}", parameters, flows)
@@ -123,7 +123,7 @@ class Work:
 
     async def saved(self) -> Project:
         """Save the project and return it."""
-        await until(self._saved, "nobody holds anything, so that the project can be saved")
+        await until(self._saved, "all locks are released and the project is saved")
         stored: Project = await self.client.call("GetProject", rpc.IdArgs(self.project.id))
         return stored
 
@@ -144,7 +144,7 @@ class Work:
 
 
 @asynccontextmanager
-async def at_work(cell: Cell, browser: Browser, *extra: tuple[str, str]) -> AsyncIterator[Work]:
+async def project_on_screen(cell: Cell, browser: Browser, *extra: tuple[str, str]) -> AsyncIterator[Work]:
     """The project open on a screen. `extra` are names and types of objects to add to the scene."""
     client = await cell.client("colleague")
     scene, project = await cell.open(client)

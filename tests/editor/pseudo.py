@@ -22,14 +22,14 @@ _LETTERS: Final = str.maketrans(_PLAIN, _ACCENTED)
 _LONGER: Final = str.maketrans({letter: letter * 2 for letter in "áéíóúÁÉÍÓÚ"})
 _SLIGHTLY_LONGER: Final = str.maketrans({"é": "éé"})
 _SHORT: Final = 12
-"""Letters of a short text: few controls have room for more."""
+"""Largest number of letters of a short text. Few controls have room for a longer one."""
 _MESSAGES: Final = re.compile(r"JSON\.parse\(`(.*?[^\\])`\)", re.DOTALL)
 _FIELD: Final = re.compile(r"\{\w*\}")
 _UNTRANSLATED: Final = (Path(__file__).with_name("untranslated.js")).read_text()
 
 
 def pseudo(text: str) -> str:
-    """Return a text in the pseudo-locale. Fields stay."""
+    """Return a text in the pseudo-locale. Fields stay unchanged."""
     plain = sum(letter in _PLAIN for letter in _FIELD.sub("", text))
     longer = _LONGER if plain > _SHORT else _SLIGHTLY_LONGER
     parts = _FIELD.split(text)
@@ -74,7 +74,7 @@ class PseudoWords(Words):
 
 
 async def use_pseudo_locale(page: Page) -> None:
-    """Show the page in the pseudo-locale, when its language is `LOCALE`: the catalogue, and the texts of the server."""
+    """Replace the catalogue of `LOCALE` and the server's texts in this language by the pseudo-locale."""
     texts = {key: pseudo(key) for key in server_texts(LOCALE)}
     assets = ROOT / "server" / "arcor2_server" / "editor_files" / "assets"
     content = next(assets.glob("en-*.js")).read_text()

@@ -22,7 +22,7 @@ async def reset(cell: Cell, browser: Browser) -> None:
     """Close and delete all documents and packages, clear the users' settings, and clear all faults.
 
     The record of runs cannot be deleted: after a run, and after a test that stopped the server, the server is started
-    again on an empty data directory. The screens of a test that its time limit cut off are still open: they are closed.
+    again on an empty data directory. A test that exceeded its time limit leaves screens open. They are closed.
     """
     await close_abandoned(browser)
     await cell.close_clients()
@@ -32,7 +32,7 @@ async def reset(cell: Cell, browser: Browser) -> None:
         await _empty(cell)
     USERS.clear()
     await cell.command_fake("tester", "renew")
-    await cell.command_fake("reader", "renew")  # its code, too
+    await cell.command_fake("reader", "renew")  # this clears its code, too
     await cell.command_fake("robot", "heal")
     if (await cell.command_fake("robot", "truth"))["safety"] != "NORMAL":
         await cell.renew_robot()
@@ -55,20 +55,20 @@ async def _has_runs(cell: Cell) -> bool:
 
 async def _empty(cell: Cell) -> None:
     async with Client(cell.url, "reset", reconnect=False) as client:
-        await until(partial(_is_empty, client), "all documents are closed, and deleted with all packages", 30)
+        await until(partial(_try_to_empty, client), "all documents are closed, and deleted with all packages", 30)
         uploaded = {each.type for each in await client.get_object_types() if not each.built_in}
         if uploaded:
             await client.delete_object_types(uploaded)
         await _clear_views(client, ViewScope.SHARED)
-        await _command_cell(client)
+        await _reset_mode_and_authority(client)
     for user in sorted(USERS):
-        await until(partial(_is_forgotten, cell, user), f"{user} has left, and the user's settings are cleared", 30)
+        await until(partial(_clear_user, cell, user), f"{user} has left, and the user's settings are cleared", 30)
     async with httpx.AsyncClient(timeout=60, base_url=cell.url.replace("ws", "http", 1)) as rest:
         (await rest.put("/api/calibration/markers", json={})).raise_for_status()
 
 
-async def _is_empty(client: Client) -> bool:
-    """Stop, close and delete everything that can be now, and return whether nothing is left."""
+async def _try_to_empty(client: Client) -> bool:
+    """Stop, close and delete everything that can be deleted now, and return whether nothing is left."""
     for end in (client.stop_package, client.stop_scene, partial(client.close_project, force=True)):
         with contextlib.suppress(RequestFailed):
             await end()
@@ -92,7 +92,7 @@ async def _is_empty(client: Client) -> bool:
     return closed and not (packages or projects or scenes)
 
 
-async def _command_cell(client: Client) -> None:
+async def _reset_mode_and_authority(client: Client) -> None:
     """Set mode and authority of the cell to their defaults."""
     status = await client.call("GetCell")
     if status.mode is not CellMode.PRODUCE:
@@ -101,7 +101,7 @@ async def _command_cell(client: Client) -> None:
         await client.call("SetCellAuthority", rpc.SetCellAuthorityArgs(CellAuthority.HUB))
 
 
-async def _is_forgotten(cell: Cell, user: str) -> bool:
+async def _clear_user(cell: Cell, user: str) -> bool:
     """Clear the settings of a user and return True; False while the user is connected."""
     try:
         async with Client(cell.url, user, reconnect=False) as client:

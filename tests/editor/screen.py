@@ -16,7 +16,7 @@ from playwright.async_api import Browser, BrowserContext, ConsoleMessage, Error,
 from tests.editor import texts
 
 ARGUMENTS: Final = [
-    "--no-sandbox",  # containers seldom allow one
+    "--no-sandbox",  # containers seldom allow a sandbox
     "--disable-background-networking",
     "--disable-gpu",  # the page is composed without OpenGL, which halves the processor time on machines without a GPU
     "--enable-unsafe-swiftshader",  # WebGL in software
@@ -40,12 +40,12 @@ SMALLEST: Final = 44
 """Smallest side of a control, CSS pixels."""
 expect.set_options(timeout=SEEN_WITHIN * 1000)
 SERVER_GONE: Final = ("WebSocket connection to", "net::ERR_CONNECTION_", "net::ERR_CONTENT_LENGTH_MISMATCH")
-"""What Chromium logs when the server is killed while it is connected, loads a part of the page, or receives one."""
+"""Errors that Chromium logs when the server is killed while the page is connected or still loads a file."""
 USERS: Final = set[str]()
 """Names of the users who have joined since the workplace was reset."""
 
-MOST_FREE: Final = 3
-"""Largest number of browser contexts kept for later screens."""
+MAX_FREE: Final = 3
+"""Largest number of browser contexts that are cached for later screens."""
 _FREE: Final = WeakKeyDictionary[Browser, list[tuple[tuple[bool, str], BrowserContext]]]()
 """Contexts that no screen uses, with touch and locale, of each browser that reuses contexts."""
 
@@ -55,7 +55,7 @@ FONTS: Final = {"narrow": "62%", "wide": "125%"}
 _NODE_MODULES: Final = Path(__file__).resolve().parents[2] / "editor" / "node_modules"
 _ARCHIVO: Final = _NODE_MODULES / "@fontsource-variable" / "archivo" / "files" / "archivo-latin-wdth-normal.woff2"
 _FONT: Final = Path(__file__).with_name("font.js").read_text()
-_BEHIND: Final = Path(__file__).with_name("behind.sh")
+_LOW_PRIORITY: Final = Path(__file__).with_name("behind.sh")
 _LAYOUT: Final = Path(__file__).with_name("layout.js").read_text()
 _CLIPPED: Final = Path(__file__).with_name("clipped.js").read_text()
 _AXE: Final = _NODE_MODULES / "axe-core" / "axe.min.js"
@@ -107,7 +107,7 @@ _RULES: Final = """async () => {
 
 
 def chromium() -> str:
-    """The browser that `make test` installs."""
+    """Return the path of the browser that `make test` installs."""
     found = filter(None, map(shutil.which, ("chromium-headless-shell", "chromium", "chromium-browser")))
     if not (path := next(found, None)):
         raise FileNotFoundError("Chromium is not installed. Run `make .make/browser`.")
@@ -115,23 +115,25 @@ def chromium() -> str:
 
 
 @asynccontextmanager
-async def running_browser(*more: str, behind: bool = False, reusing: bool = False) -> AsyncIterator[Browser]:
+async def running_browser(
+    *more: str, low_priority: bool = False, reuse_contexts: bool = False
+) -> AsyncIterator[Browser]:
     """Run Chromium with additional arguments.
 
     Args:
         more: additional arguments.
-        behind: with a low priority, so that software rendering does not delay drivers and fakes.
-        reusing: with contexts that later screens use again. Their code and process are kept, which halves the processor
-            time of loading the page. Cookies and storage are cleared. Less code is optimised. Measurements need new
-            contexts.
+        low_priority: run the browser with a low priority, so that software rendering does not delay drivers and fakes.
+        reuse_contexts: let later screens use the contexts again. Their code and process stay cached, which halves the
+            processor time of loading the page. Cookies and storage are cleared. Less code is optimised. Measurements
+            need new contexts.
     """
-    if reusing:
+    if reuse_contexts:
         more = (*more, "--renderer-process-limit=1", SELDOM_OPTIMISED)  # one process for each context
     async with async_playwright() as playwright:
-        path = _BEHIND if behind else chromium()
+        path = _LOW_PRIORITY if low_priority else chromium()
         environment: dict[str, str | float | bool] = {**os.environ, "BROWSER": chromium()}
         browser = await playwright.chromium.launch(executable_path=path, args=[*ARGUMENTS, *more], env=environment)
-        if reusing:
+        if reuse_contexts:
             _FREE[browser] = []
         try:
             yield browser
@@ -298,7 +300,7 @@ async def _new_page(browser: Browser, origin: str, *, touch: bool, locale: str) 
             for opened in context.pages[1:]:
                 await opened.close()
             free.append((kind, context))
-            reusable = len(free) <= MOST_FREE
+            reusable = len(free) <= MAX_FREE
             context = context if reusable else free.pop(0)[1]
     finally:
         if not reusable:

@@ -10,7 +10,7 @@ from arcor2_hw.client import Client
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.parameter import Parameter
 from tests.e2e.harness import Cell
-from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, in_view, pose, tilted
+from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, pose, rotated_about_z, visible_things
 
 SCENE = "by pictures"
 NAMES = {SCENE, "eye", "arm"}
@@ -28,12 +28,12 @@ async def camera_of(cell: Cell, *, width: int = 1280, height: int = 720) -> Asyn
 
 async def new_scene(cell: Cell, client: Client) -> dict[str, str]:
     """Open a new scene whose poses of camera and robot are wrong; return the ids of `scene`, `eye` and `arm`."""
-    await cell.command_fake("camera", "scene", things=in_view())
+    await cell.command_fake("camera", "scene", things=visible_things())
     await cell.command_fake("camera", "camera", pose=pose(CAMERA))
     await cell.command_fake("robot", "place", q=Q)
     await client.new_scene(SCENE)
     near = Pose(CAMERA.position + Position(0.1, -0.05, 0.08), CAMERA.orientation)
-    wrong = Pose(ROBOT.position + Position(0.02, -0.015, 0.01), ROBOT.orientation * tilted(0.03))
+    wrong = Pose(ROBOT.position + Position(0.02, -0.015, 0.01), ROBOT.orientation * rotated_about_z(0.03))
     slow = [_setting("max_age", 5.0), _setting("frame_timeout", 10.0)]  # a busy machine renders slowly
     address = _setting("address", cell.at["camera"]["stream"])
     host = _setting("host", cell.robot_host)

@@ -20,16 +20,17 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
 from tests.editor import texts
 from tests.editor.ar_probe import overlay_errors
-from tests.editor.camera_video import CAMERA, MARKERS, MIDDLE, Shot, marker_table, write_video
+from tests.editor.camera_video import CAMERA_ARGUMENTS, MARKERS, MIDDLE, Shot, marker_table, write_video
 from tests.editor.screen import SMALLEST, VIEWPORTS, Screen, running_browser, screen_of
 from tests.server.core.serving import ServerProcess, running, talking
 
 Point = tuple[float, float, float]
 ASIDE: list[Point] = [(0.69, 0.025, 0.0), (-0.31, 0.025, 0.0), (0.19, 0.525, 0.0), (0.19, 0.025, 0.3)]
-"""Points half a metre from the middle of the markers, m, and one above it."""
+"""Points on the table half a metre from the middle of the markers, and one above the middle, m."""
 MAX_NEAR = 0.001
 """Largest error of the overlay near the markers, m."""
 MAX_ASIDE = 0.002
+"""Largest error of the overlay at the points `ASIDE`, m."""
 RECORD_TRACKS = """{
     const ask = navigator.mediaDevices?.getUserMedia.bind(navigator.mediaDevices);
     window.__tracks = [];
@@ -39,7 +40,7 @@ RECORD_TRACKS = """{
         return stream;
     };
 }"""
-"""Record the tracks of the camera in the page."""
+"""Record the media tracks of the camera in `window.__tracks`."""
 DARKEN = """() => {
     const canvas = Object.assign(document.createElement("canvas"), { width: 1280, height: 720 });
     const context = canvas.getContext("2d");
@@ -146,10 +147,10 @@ async def check_placing_by_hand(screen: Screen) -> None:
     await expect(quality).to_have_text(re.compile("Not placed"))
 
 
-async def until_fitting(
+async def wait_for_overlay(
     screen: Screen, shots: list[Shot], points: list[tuple[float, float, float]], most: float
 ) -> None:
-    """Wait until the overlay fits in five consecutive looks."""
+    """Wait until the overlay error is at most `most`, m, in five consecutive measurements."""
     fitting, worst = 0, 0.0
     for _ in range(600):
         if errors := await overlay_errors(screen, shots, points):
@@ -162,7 +163,7 @@ async def until_fitting(
 
 
 async def check_carrying(screen: Screen, box: str, server: ServerProcess) -> None:
-    """While its button is held, the selected item moves with the tablet; then it is one edit on the server."""
+    """Check that the item moves with the tablet while the button is held, and that the server receives one edit."""
     page = screen.page
     await page.get_by_role("navigation").get_by_role("button", name=texts.OBJECTS, exact=True).click()
     await page.get_by_role("row", name="box").first.click()
@@ -192,7 +193,7 @@ async def check_carrying(screen: Screen, box: str, server: ServerProcess) -> Non
 async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp_path: Path) -> None:
     shots = write_video(tmp_path / "camera.mjpeg")
     async with (
-        running_browser(*CAMERA, f"--use-file-for-fake-video-capture={tmp_path / 'camera.mjpeg'}") as browser,
+        running_browser(*CAMERA_ARGUMENTS, f"--use-file-for-fake-video-capture={tmp_path / 'camera.mjpeg'}") as browser,
         screen_of(browser, server.url, "ipad", touch=True, drawn=True) as screen,
     ):
         page = screen.page
@@ -213,12 +214,12 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         assert await screen.barriers() == []
         await screen.picture("ar start")
         await screen.press("Start AR")
-        await until_fitting(screen, shots, [MIDDLE], MAX_NEAR)
+        await wait_for_overlay(screen, shots, [MIDDLE], MAX_NEAR)
         await check_stop(screen)
         # The focal length is found while the camera moves.
         quality = page.get_by_role("group", name="Quality of AR")
         await expect(quality).to_have_text(re.compile(r"Good ±\d+ mm, 2 markers, now"))
-        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
+        await wait_for_overlay(screen, shots, ASIDE, MAX_ASIDE)
         # A correction of the registration is shown as such, and can be reset.
         placing = page.get_by_role("group", name="Place the workplace")
         await screen.press("Place")
@@ -227,34 +228,34 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await screen.picture("ar nudged")
         await placing.get_by_role("button", name="Reset").click()
         await screen.press("Place")
-        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
+        await wait_for_overlay(screen, shots, ASIDE, MAX_ASIDE)
         outlines = page.get_by_role("button", name="Markers")
         await outlines.click()
         await expect(page.locator(".ar-markers polygon.seen")).to_have_count(2)
         await screen.picture("ar ipad")
         await outlines.click()
-        # Without markers in sight, the reason is shown, and the view is found again.
+        # Without visible markers, the reason is shown. Afterwards the camera is registered again.
         await page.evaluate(DARKEN)
         await screen.sees("It is too dark for the camera.")
         await screen.picture("ar lost")
         await page.evaluate("() => { __ar.video.srcObject = __camera; __ar.video.play(); }")
-        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
+        await wait_for_overlay(screen, shots, ASIDE, MAX_ASIDE)
         await page.evaluate("() => { window.__worker = __ar.worker; }")
         await screen.press("Recalibrate")
         await screen.until("() => __ar.worker !== __worker && __ar.shown.found.checked")
-        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
+        await wait_for_overlay(screen, shots, ASIDE, MAX_ASIDE)
         # A frozen picture is not drawn again, and the editor works over it.
         await screen.press("Freeze")
         await screen.sees("Frozen")
         await screen.settle()
         assert await screen.faults() == []
         assert await screen.barriers() == []
-        # The picture is where the markers are expected.
+        # The shown picture contains the configured markers.
         screenshot = cv2.imdecode(np.frombuffer(await page.screenshot(), np.uint8), cv2.IMREAD_GRAYSCALE)
         assert screenshot is not None
         dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
         _, numbers, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(screenshot)
-        # A panel may cover one of them.
+        # A panel may cover one of the markers.
         found = set(np.ravel(numbers).tolist())
         assert found
         assert found <= set(MARKERS)
@@ -272,7 +273,7 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await check_stop(screen)
         await screen.close_panels()
         await screen.press("Continue")
-        await until_fitting(screen, shots, [MIDDLE], MAX_NEAR)
+        await wait_for_overlay(screen, shots, [MIDDLE], MAX_NEAR)
         assert await screen.faults() == []
         await check_stop(screen)
         await screen.picture("ar phone")
@@ -302,7 +303,7 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await expect(page.get_by_text("Adam in AR")).to_have_count(0)
         # The focal length is stored for this camera, so the next registration is good at once.
         await start_ar(screen)
-        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
+        await wait_for_overlay(screen, shots, ASIDE, MAX_ASIDE)
         assert "unchecked" not in await quality.inner_text()
         await page.evaluate("() => { const now = Date.now(); Date.now = () => now + 31 * 60_000; }")
         await screen.sees("You have used AR for half an hour.")
@@ -312,7 +313,7 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         assert await page.get_by_role("button", name=texts.SETTINGS).is_visible()
 
 
-def test_codes_of_markers_are_those_of_opencv() -> None:
+def test_marker_codes_equal_those_of_opencv() -> None:
     source = (Path(__file__).parents[2] / "editor" / "src" / "ar" / "codes.ts").read_text()
     written = "".join(re.findall(r'^  "([0-9a-f]{100})"', source, re.MULTILINE))
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250)

@@ -23,7 +23,9 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 @dataclass
-class Place:
+class Opened:
+    """The open project, and a second client."""
+
     cell: Cell
     client: Client
     scene: Scene
@@ -37,15 +39,15 @@ class Place:
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def place(cell: Cell) -> AsyncIterator[Place]:
-    """The project is open. Each test joins as another user."""
+async def opened(cell: Cell) -> AsyncIterator[Opened]:
+    """An open project. Each test joins as another user."""
     client = await cell.client("colleague")
-    yield Place(cell, client, *await cell.open(client))
+    yield Opened(cell, client, *await cell.open(client))
 
 
-async def _came_in(screen: Screen, name: str, place: Place) -> None:
+async def _join(screen: Screen, name: str, opened: Opened) -> None:
     await screen.join(name)
-    await screen.item(place.object("robot"))
+    await screen.item(opened.object("robot"))
     await screen.page.locator(".view-controls").wait_for()
 
 
@@ -53,18 +55,18 @@ async def _tool(screen: Screen, name: str) -> None:
     await screen.page.get_by_role("navigation").get_by_role("button").filter(has_text=name).click()
 
 
-async def _headed(screen: Screen, name: str) -> None:
+async def _wait_for_panel_of(screen: Screen, name: str) -> None:
     """Wait until the panel shows the object of this name."""
     await screen.page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
 
 
-async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: Browser) -> None:
-    client = place.client
+async def test_crosshair_selects_near_and_hidden_objects(opened: Opened, browser: Browser) -> None:
+    client = opened.client
     await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"UserPresence"}))
-    point = place.point("feeder")
-    async with screen_of(browser, place.cell.url) as screen:
+    point = opened.point("feeder")
+    async with screen_of(browser, opened.cell.url) as screen:
         page = screen.page
-        await _came_in(screen, "Iris", place)
+        await _join(screen, "Iris", opened)
         await page.keyboard.press("x")
         bar = page.get_by_role("group", name=texts.AT_CROSSHAIR)
         # From below, through the table: the target may be hidden.
@@ -75,7 +77,7 @@ async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: 
         # Other users are notified of the target before anything is selected.
         presence = await _presence(client, lambda presence: presence.aimed == point.id)
         assert list(presence.selected) == []
-        assert await page.evaluate(_UNDER_THE_MIDDLE) != point.id, "nothing is in front"
+        assert await page.evaluate(_ID_AT_CENTRE) != point.id, "nothing is in front"
 
         # Two keys select the next best target; taps do the same.
         await page.keyboard.press("n")
@@ -84,7 +86,7 @@ async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: 
         second = (await select.get_attribute("aria-label") or "").removeprefix("Select ")
         assert second != "feeder"
         await page.keyboard.press("Enter")
-        await _headed(screen, second)
+        await _wait_for_panel_of(screen, second)
         selected = (await _presence(client, lambda presence: len(presence.selected) == 1)).selected[0]
         assert (await screen.item(selected))["name"] == second
         # A selected action spreads its stack, which adds candidates.
@@ -95,7 +97,7 @@ async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: 
             if await feeder.count():
                 break
         await feeder.click()
-        await _headed(screen, "feeder")
+        await _wait_for_panel_of(screen, "feeder")
         await screen.picture("cross")
         await page.keyboard.press("x")
         await bar.wait_for(state="detached")
@@ -119,37 +121,37 @@ async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: 
 
 
 async def _presence(client: Client, fits: Callable[[Any], bool]) -> Any:
-    """Return the next presence of a user that fits."""
+    """Return the next presence of a user for which `fits` is true."""
     while not ((presence := (await client.next_event("UserPresence")).data.presence) and fits(presence)):
         pass
     return presence
 
 
-_UNDER_THE_MIDDLE = """() => {
+_ID_AT_CENTRE = """() => {
     const { clientWidth, clientHeight } = document.querySelector(".view");
     return __engine.pick(clientWidth / 2, clientHeight / 2, 0)[0].id;
 }"""
 
 
-async def test_object_list_is_filtered_folded_and_stepped_through(place: Place, browser: Browser) -> None:
-    client = place.client
-    actions = [action.name for point in place.project.action_points for action in point.actions]
+async def test_object_list_is_filtered_collapsed_and_stepped_through(opened: Opened, browser: Browser) -> None:
+    client = opened.client
+    actions = [action.name for point in opened.project.action_points for action in point.actions]
 
-    async def kept(key: str) -> Any:
-        state = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, place.project.id, "Ida"))
+    async def stored(key: str) -> Any:
+        state = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, opened.project.id, "Ida"))
         return state.values.get(key)
 
-    async with screen_of(browser, place.cell.url) as screen:
+    async with screen_of(browser, opened.cell.url) as screen:
         page = screen.page
-        await _came_in(screen, "Ida", place)
+        await _join(screen, "Ida", opened)
         await _tool(screen, texts.OBJECTS)
         tree = page.get_by_role("treegrid", name=texts.OBJECTS)
-        # Objects without a pose are listed below a heading of their own.
+        # Objects without a pose are listed below a separate heading.
         await page.get_by_role("heading", name="Without a pose").wait_for()
         unplaced = page.get_by_role("treegrid", name="Without a pose").get_by_role("row")
-        without = sorted(each.name for each in place.scene.objects if not isinstance(each.pose, Pose))
+        without = sorted(each.name for each in opened.scene.objects if not isinstance(each.pose, Pose))
         assert without
-        assert [row.split()[0] for row in await _labels(unplaced)] == without
+        assert [row.split()[0] for row in await _row_labels(unplaced)] == without
 
         # A filter shows only actions and their points; the server stores it.
         chips = page.get_by_role("toolbar", name="Only these kinds")
@@ -157,27 +159,29 @@ async def test_object_list_is_filtered_folded_and_stepped_through(place: Place, 
         await robots.wait_for()
         await chips.get_by_role("button", name=f"Actions {len(actions)}").click()
         await unplaced.first.wait_for(state="detached")
-        shown = await _labels(tree.get_by_role("row"))
+        shown = await _row_labels(tree.get_by_role("row"))
         assert sorted(name for name in shown if name.endswith(" Action")) == sorted(
             f"{name} Action" for name in actions
         )
         assert "feeder Action point" in shown
         assert "robot Universal Robots UR5e" not in shown
-        await until(lambda: _is(kept, "filters", ["actions"]), "the server keeps the filter")
+        await until(lambda: _equals(stored, "filters", ["actions"]), "the server stores the filter")
         await page.get_by_label("Search").fill("pick")
         await expect(tree.get_by_role("row")).to_have_count(2)  # and its point
         await page.get_by_label("Search").fill("")
         await chips.get_by_role("button", name=f"Actions {len(actions)}").click()
 
-        # Folded by a key, also after a reload.
+        # A row that is collapsed with a key stays collapsed after a reload.
         tester = tree.get_by_role("row", name="tester Functional tester")
         await tester.focus()
         await page.keyboard.press("ArrowLeft")
         await tree.get_by_role("row", name="fixture Action point").wait_for(state="detached")
         assert await tester.get_attribute("aria-expanded") == "false"
-        await until(lambda: _is(kept, "collapsed", [place.object("tester")]), "the server keeps what is folded")
+        await until(
+            lambda: _equals(stored, "collapsed", [opened.object("tester")]), "the server stores the collapsed rows"
+        )
         await page.reload()
-        await screen.item(place.object("robot"))
+        await screen.item(opened.object("robot"))
         await _tool(screen, texts.OBJECTS)
         await tester.wait_for()
         assert await tester.get_attribute("aria-expanded") == "false"
@@ -189,45 +193,45 @@ async def test_object_list_is_filtered_folded_and_stepped_through(place: Place, 
 
         # Step to the next and the previous object; with a filter, to the next of that kind.
         await tree.get_by_role("row", name="robot Universal Robots UR5e").click()
-        await _headed(screen, "robot")
+        await _wait_for_panel_of(screen, "robot")
         await screen.press("Next: table")
-        await _headed(screen, "table")
+        await _wait_for_panel_of(screen, "table")
         await screen.press("Previous: robot")
-        await _headed(screen, "robot")
+        await _wait_for_panel_of(screen, "robot")
         await _tool(screen, texts.OBJECTS)
         await chips.get_by_role("button", name="Points").click()
         await tree.get_by_role("row", name="fixture Action point").click()
         await screen.press("Next: feeder")
-        await _headed(screen, "feeder")
+        await _wait_for_panel_of(screen, "feeder")
 
 
-async def _labels(rows: Locator) -> list[str]:
+async def _row_labels(rows: Locator) -> list[str]:
     return [await row.get_attribute("aria-label") or "" for row in await rows.all()]
 
 
-async def _is(ask: Any, key: str, expected: Any) -> bool:
+async def _equals(ask: Any, key: str, expected: Any) -> bool:
     return bool(await ask(key) == expected)
 
 
-async def test_selection_out_of_view_is_found_and_objects_are_faded(place: Place, browser: Browser) -> None:
-    point, table = place.point("fixture"), place.object("table")
-    async with screen_of(browser, place.cell.url, touch=True, drawn=True) as screen:
+async def test_selection_out_of_view_is_found_and_objects_are_faded(opened: Opened, browser: Browser) -> None:
+    point, table = opened.point("fixture"), opened.object("table")
+    async with screen_of(browser, opened.cell.url, touch=True, drawn=True) as screen:
         page = screen.page
-        await _came_in(screen, "Olga", place)
+        await _join(screen, "Olga", opened)
         # Points have the same size on the screen from any distance, scaled by the user.
         at = list((await screen.item(point.id))["pose"]["position"].values())
         far, near = [[0, -9, 5], [0, 0, 0]], [[at[0] + 0.3, at[1] - 0.3, at[2] + 0.3], at]
-        assert await _drawn(screen, point.id, far) > 3 * await _drawn(screen, point.id, near)
-        # Labels of points and actions appear when near, at most eight; a stack of actions has one with their number.
-        close_by = {action.name for each in place.project.action_points for action in each.actions}
-        assert f"{point.name} ×{len(point.actions)}" in await _names(screen)
+        assert await _drawn_scale(screen, point.id, far) > 3 * await _drawn_scale(screen, point.id, near)
+        # Labels of near points and actions appear, at most eight. A stack of actions has one label with their number.
+        action_names = {action.name for each in opened.project.action_points for action in each.actions}
+        assert f"{point.name} ×{len(point.actions)}" in await _visible_labels(screen)
         await screen.page.evaluate("id => __engine.hover(id)", point.actions[0].id)
         await screen.until("() => __engine.scheduled === 0")
-        assert point.actions[0].name in await _names(screen)
+        assert point.actions[0].name in await _visible_labels(screen)
         await screen.page.evaluate("__engine.hover('')")
-        await _drawn(screen, point.id, far)
-        assert not close_by & set(await _names(screen))
-        before = await _drawn(screen, point.id, near)
+        await _drawn_scale(screen, point.id, far)
+        assert not action_names & set(await _visible_labels(screen))
+        before = await _drawn_scale(screen, point.id, near)
         await _tool(screen, texts.POINTS)
         await page.get_by_role("slider", name="Point size").press("End")
         await screen.until(_SCALE_OVER, [point.id, 3.9 * before])
@@ -236,34 +240,36 @@ async def test_selection_out_of_view_is_found_and_objects_are_faded(place: Place
         await _tool(screen, texts.OBJECTS)
         assert await page.evaluate("__engine.parentLines.count") == 0
         await page.get_by_text("Lines from points to their parents").click()
-        hanging = sum(1 for each in place.project.action_points if each.parent)
-        await screen.until("count => __engine.parentLines.count === count", hanging)
+        with_parent = sum(1 for each in opened.project.action_points if each.parent)
+        await screen.until("count => __engine.parentLines.count === count", with_parent)
         await page.evaluate("__engine.view.look('top')")
         opaque = await _colour_of(screen, table)
         await page.get_by_role("slider", name="Transparency of objects").press("End")
         await screen.until("id => __engine.item(id).faint === 0.95", table)
-        assert await page.evaluate("id => __engine.item(id).faint", place.object("robot")) == 0
+        assert await page.evaluate("id => __engine.item(id).faint", opened.object("robot")) == 0
         through = await _colour_of(screen, table)
         assert max(abs(a - b) for a, b in zip(opaque, through, strict=True)) > 20, (opaque, through)
         await page.get_by_role("toolbar", name="Only these kinds").get_by_role("button", name="Points").click()
         await page.get_by_text("Fade other kinds").click()
-        await screen.until("id => __engine.item(id).faint === 0.85", place.object("robot"))
-        action = place.project.action_points[0].actions[0].id
+        await screen.until("id => __engine.item(id).faint === 0.85", opened.object("robot"))
+        action = opened.project.action_points[0].actions[0].id
         assert not (await screen.item(action))["visible"] or (await screen.item(action))["faint"] == 1
         assert (await screen.item(point.id))["faint"] == 0
         await screen.picture("points alone")
         await page.get_by_text("Fade other kinds").click()
-        steps = [item.id for item in place.project.logic]
+        steps = [item.id for item in opened.project.logic]
         await screen.until("id => __engine.ids().includes(id)", steps[0])
         await page.get_by_text("Program steps").click()
         await screen.until("ids => !__engine.ids().some((id) => ids.includes(id))", steps)
         assert (await screen.item(point.orientations[0].id))["faint"] == 0
         await page.get_by_text("Orientation arrows").click()
         await screen.until("id => __engine.item(id).faint === 1", point.orientations[0].id)
-        kept = await place.client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, place.project.id, "Olga"))
-        assert (kept.values["hide_steps"], kept.values["hide_orientations"]) == (True, True)
+        state = await opened.client.call(
+            "GetViewState", rpc.GetViewStateArgs(ViewScope.USER, opened.project.id, "Olga")
+        )
+        assert (state.values["hide_steps"], state.values["hide_orientations"]) == (True, True)
 
-        # For a selection outside the view there is an arrow at the edge; a tap turns the view.
+        # If the selection is outside the view, an arrow appears at the edge. A tap on it turns the view.
         await page.get_by_role("row", name=f"{point.name} Action point").click()
         arrow = page.get_by_role("button", name=f"Turn the view to {point.name}")
         assert await arrow.count() == 0
@@ -291,21 +297,21 @@ _SCALE = """id => {
 _SCALE_OVER = f"([id, least]) => ({_SCALE})(id) > least"
 
 
-async def _names(screen: Screen) -> list[str]:
-    """Return the labels in the view."""
+async def _visible_labels(screen: Screen) -> list[str]:
+    """Return the visible labels in the view, at most eight."""
     names = await screen.page.locator(".view-label:visible > span").all_inner_texts()
     assert 0 < len(names) <= 8
     return names
 
 
 async def test_crowded_objects_have_one_label_and_the_selection_has_views_from_above_and_a_side(
-    place: Place, browser: Browser
+    opened: Opened, browser: Browser
 ) -> None:
-    point, tester = place.point("fixture"), place.object("tester")
-    async with screen_of(browser, place.cell.url, "phone", touch=True) as screen:
+    point, tester = opened.point("fixture"), opened.object("tester")
+    async with screen_of(browser, opened.cell.url, "phone", touch=True) as screen:
         page = screen.page
-        await _came_in(screen, "Nora", place)
-        await _drawn(screen, point.id, [[0, -9, 5], [0, 0, 0]])
+        await _join(screen, "Nora", opened)
+        await _drawn_scale(screen, point.id, [[0, -9, 5], [0, 0, 0]])
         crowd = page.get_by_role("button", name=re.compile(r"^\d objects: .*tester.*Zoom in$"))
         await expect(crowd).to_have_count(1)
         await expect(page.locator(".view-label:visible").filter(has_text="tester")).to_have_count(0)
@@ -314,7 +320,7 @@ async def test_crowded_objects_have_one_label_and_the_selection_has_views_from_a
         await crowd.click()
         await expect(crowd).to_have_count(0)
         assert (await screen.item(tester))["screen"] != before
-        # The views are drawn on demand; closed, nothing of them is drawn.
+        # The top and side views are drawn only while they are open.
         await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
         await screen.settle()
         watchers = await page.evaluate("__engine.watchers.size")
@@ -334,7 +340,7 @@ async def test_crowded_objects_have_one_label_and_the_selection_has_views_from_a
         assert await page.evaluate("__engine.watchers.size") == watchers
 
 
-async def _drawn(screen: Screen, item: str, view: Any) -> float:
+async def _drawn_scale(screen: Screen, item: str, view: Any) -> float:
     """Return the scale at which a point is drawn from a viewpoint."""
     frames = await screen.frames()
     await screen.page.evaluate("([from, to]) => __engine.view.set(from, to)", view)

@@ -1,4 +1,4 @@
-"""From an empty server to a stepped program, with every tap counted."""
+"""A new user gets from an empty server to a stepped program. Every tap is counted."""
 
 import re
 from functools import partial
@@ -16,10 +16,10 @@ from tests.editor.screen import Screen, screen_of
 pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(400)]
 
 MAX_TAPS: Final = 60
-"""Before the devices were added in one form and actions connected themselves, the task took 141."""
+"""Largest number of taps. Before one form added a device and actions were connected automatically, it was 141."""
 
 
-class Counting:
+class CountedUser:
     """A user whose taps and keys are counted.
 
     A tap on a control, a drag, and a key of the number pad count one each. Digits in a number field count one each as
@@ -79,12 +79,12 @@ class Counting:
         await self.panel.get_by_role("status").filter(has_text=f"Added {added}.").wait_for()
 
 
-async def test_from_an_empty_server_to_a_stepped_program(cell: Cell, browser: Browser) -> None:
+async def test_a_new_user_steps_a_first_program_within_the_tap_limit(cell: Cell, browser: Browser) -> None:
     await cell.renew_robot()  # the height that it reports includes the tool that an earlier test has set
     await cell.command_fake("robot", "place", q=START)
     addresses = cell.addresses()
     async with screen_of(browser, cell.url, "ipad", touch=True) as screen:
-        user, page = Counting(screen), screen.page
+        user, page = CountedUser(screen), screen.page
         await screen.join("Newcomer")
         user.taps += 2
         await user.button("Start here")
@@ -177,16 +177,16 @@ async def test_from_an_empty_server_to_a_stepped_program(cell: Cell, browser: Br
         await page.get_by_role("button", name="Redo adding the action wait").wait_for()
         remaining = await client.get_project(listed.id)
         assert len(remaining.logic) == len(project.logic), "the saved project is unchanged"
-        # The object of the wait was added online, so it is a step of its own: it cannot be removed online.
+        # The object of the wait was added online, so adding it is a separate step: it cannot be removed online.
         await page.get_by_role("button", name=texts.undo("adding the object flow")).wait_for()
         await page.get_by_role("button", name="Redo adding the action wait").click()
         await page.get_by_role("button", name=texts.undo("adding the action wait")).wait_for()
 
 
 async def test_a_missing_payload_is_named_and_set(cell: Cell, browser: Browser) -> None:
-    """On a phone, too; what was typed survives closing the panel. Elsewhere, devices on serial ports are searched."""
+    """Check this on a phone. Typed values survive closing the panel, and serial ports are searched for devices."""
     async with screen_of(browser, cell.url, "phone", dark=True, touch=True) as screen:
-        user, page = Counting(screen), screen.page
+        user, page = CountedUser(screen), screen.page
         await screen.join("Observer")
         await user.button("Start here")
         await user.add()

@@ -1,7 +1,4 @@
-"""The page with all cells: a cell starts without a broker, appears, is opened, left again, and loses its signal.
-
-Then the stored results of all cells.
-"""
+"""The fleet page lists the cells and reports a lost signal. Its other pages show the stored results of all cells."""
 
 import re
 from pathlib import Path
@@ -50,7 +47,7 @@ def store_results(folder: Path) -> None:
     file.close()
 
 
-async def results_are_shown(screen: Screen) -> None:
+async def check_results(screen: Screen) -> None:
     page = screen.page
     await page.get_by_role("link", name="Units").click()
     await expect(page.get_by_role("row", name="press-3 1 1 0 50 %")).to_be_visible()
@@ -84,7 +81,9 @@ async def results_are_shown(screen: Screen) -> None:
     await expect(page.get_by_text("Žádné alarmy.").first).to_be_visible()
 
 
-async def test_a_tablet_moves_between_workplaces(browser: Browser, built_editor: Path, tmp_path: Path) -> None:
+async def test_fleet_page_opens_a_cell_and_reports_its_lost_signal(
+    browser: Browser, built_editor: Path, tmp_path: Path
+) -> None:
     port = free_port()
     store_results(tmp_path / "fleet")
     fleet = FleetProcess(f"nats://fleet:f@127.0.0.1:{port}", tmp_path / "fleet")
@@ -97,7 +96,7 @@ async def test_a_tablet_moves_between_workplaces(browser: Browser, built_editor:
     try:
         async with screen_of(browser, fleet.url, "phone") as screen:
             async with running(tmp_path / "cell", **environment) as cell:
-                # Without a broker, the cell works and says so once.
+                # Without a broker, the cell works and logs one warning.
                 async with screen_of(browser, cell.url, "phone") as alone:
                     await alone.join("Eva")
                     await expect(alone.page.get_by_text("press-3")).to_be_visible()
@@ -111,7 +110,7 @@ async def test_a_tablet_moves_between_workplaces(browser: Browser, built_editor:
                 assert await screen.barriers() == []
                 await screen.picture("fleet phone")
 
-                # The card opens the cell, which shows its name and the way back.
+                # The card opens the cell, which shows its name and a button that leads back.
                 await card.click()
                 await expect(screen.page).to_have_url(re.compile(r"#/operator$"))
                 await screen.page.get_by_label("Your name").fill("Eva")
@@ -123,11 +122,11 @@ async def test_a_tablet_moves_between_workplaces(browser: Browser, built_editor:
                 await screen.picture("operator of a named cell")
                 await back.click()
                 await expect(card).to_be_visible()
-            # The cell has ended.
+            # The cell has stopped.
             await expect(screen.page.locator('.fleet-card[data-level="gone"]')).to_contain_text("No signal since")
             await screen.page.get_by_role("button", name="Remove press-3 from this page").click()
             await screen.sees("No cells yet")
-            await results_are_shown(screen)
+            await check_results(screen)
     finally:
         fleet.kill()
         if broker is not None:

@@ -1,4 +1,4 @@
-"""Functions: made of a run of actions, called again with another value, opened, and run with a breakpoint inside."""
+"""Functions: made from selected actions, called again with another value, opened, and run with a breakpoint inside."""
 
 import json
 from collections.abc import AsyncIterator
@@ -13,17 +13,17 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import ActionParameter, Flow, Project
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
-from tests.editor.programming import Work, at_work
+from tests.editor.programming import Work, project_on_screen
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
-BEGUN = 60_000
-"""Timeout for a started program to run: it is built and its host started, on a busy machine, ms."""
+START_TIMEOUT = 60_000
+"""Timeout for a program to start, ms. On a busy machine, building it and starting its host take long."""
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def opened(module_cell: Cell, browser: Browser) -> AsyncIterator[Work]:
-    async with at_work(module_cell, browser) as open_project:
+    async with project_on_screen(module_cell, browser) as open_project:
         yield open_project
 
 
@@ -34,8 +34,8 @@ async def work(opened: Work) -> Work:
     return opened
 
 
-async def _without_scan(work: Work) -> None:
-    """Lead the program past the reader, which has no code in front of it."""
+async def _skip_scan(work: Work) -> None:
+    """Let the program skip the reader, which has no code in front of it."""
     first = next(item for item in work.project.logic if item.end == work.action("scan").id)
     args = rpc.UpdateLogicItemArgs(first.id, first.start, work.action("open").id, first.condition)
     await work.client.call("UpdateLogicItem", args)
@@ -45,9 +45,9 @@ def _functions(project: Project) -> dict[str, list[str]]:
     return {each.name: [action.name for action in each.actions] for each in project.functions}
 
 
-async def test_a_run_of_actions_becomes_a_function_that_is_called_again(work: Work, tmp_path: Path) -> None:
+async def test_selected_actions_become_a_function_that_is_called_again(work: Work, tmp_path: Path) -> None:
     screen, page, panel = work.screen, work.screen.page, work.panel
-    await _without_scan(work)
+    await _skip_scan(work)
     await work.mode("Flow")
     graph = page.get_by_role("region", name=texts.GRAPH)
 
@@ -87,7 +87,7 @@ async def test_a_run_of_actions_becomes_a_function_that_is_called_again(work: Wo
     await call.wait_for()
     await tap("check_board")
 
-    # Step into it: a value becomes a parameter.
+    # Open the function: a value becomes a parameter.
     await panel.get_by_role("button", name="Open function").click()
     crumbs = page.get_by_role("navigation", name="Open function")
     await expect(crumbs).to_contain_text("check_board")
@@ -119,8 +119,8 @@ async def test_a_run_of_actions_becomes_a_function_that_is_called_again(work: Wo
     await panel.get_by_role("button", name="Set parameters").click()
     await panel.get_by_label("program", exact=True).fill("2")
     await panel.get_by_label("program", exact=True).press("Enter")
-    again = graph.locator(node("check_board_2"))
-    await expect(again).to_contain_text("program 2")
+    second_call = graph.locator(node("check_board_2"))
+    await expect(second_call).to_contain_text("program 2")
     calls = [each for each in (await work.saved()).all_actions() if each.name.startswith("check_board")]
     assert sorted(each.parameters[0].value for each in calls) == ["1", "2"]
 
@@ -142,7 +142,7 @@ async def test_a_run_of_actions_becomes_a_function_that_is_called_again(work: Wo
     # Another user renames it.
     function_id = (await work.saved()).functions[0].id
     await work.client.call("RenameFunction", rpc.RenameFunctionArgs(function_id, "check"))
-    await expect(again).to_contain_text("function check")
+    await expect(second_call).to_contain_text("function check")
 
     # Export, and import as a copy.
     menu = panel.get_by_role("button", name="Function check", exact=True)
@@ -193,14 +193,14 @@ async def test_a_run_of_actions_becomes_a_function_that_is_called_again(work: Wo
     await expect(crumbs).to_have_count(0)
     assert sorted(_functions(await work.saved())) == ["check", "other"]
 
-    # A breakpoint inside; the call runs meanwhile.
+    # The program pauses at a breakpoint inside the function. The call is shown as running.
     await tap("check_board")
     await panel.get_by_role("button", name="Open function").click()
     await graph.locator(node("open")).wait_for()
     await tap("open")
     await work.tap_button("Run to here", panel)
     bar = page.get_by_role("group", name=texts.PROGRAM_STATE)
-    await expect(bar).to_contain_text("before check_board › open", timeout=BEGUN)
+    await expect(bar).to_contain_text("before check_board › open", timeout=START_TIMEOUT)
     await work.next_event("PackageState", lambda event: event.data.state is PackageStateEnum.PAUSED)
     await expect(graph.locator(node("open"))).to_contain_text("next")
     await bar.get_by_role("button", name="Step out").wait_for()

@@ -1,4 +1,4 @@
-"""Hold-to-move ends with the release of the button and with every loss of the page or the server."""
+"""The robot stops when the hold-to-move button is released, and when the page or the server is lost."""
 
 import asyncio
 import contextlib
@@ -19,16 +19,16 @@ from tests.editor.screen import SERVER_GONE, Screen, screen_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
-RESTS_WITHIN = 5.0
-"""Time limit for standstill, s. Without a release the robot would move on. Benchmarks measure the time."""
-STAYS = 0.6
+STOP_TIMEOUT = 5.0
+"""Time limit for the robot to stop, s. A robot that is not stopped moves on. Benchmarks measure the stopping time."""
+STANDSTILL_TIME = 0.6
 """Time for which the robot must stay at standstill afterwards, s."""
 HOLD = "Hold to move along +Z"
 
-Loss = Callable[[Screen, CDPSession], Awaitable[object]]
+PageLoss = Callable[[Screen, CDPSession], Awaitable[object]]
 
 
-async def let_go(screen: Screen) -> None:
+async def release_button(screen: Screen) -> None:
     await screen.page.mouse.up()
 
 
@@ -58,24 +58,24 @@ async def crash(_: Screen, devtools: CDPSession) -> None:
         await asyncio.wait_for(devtools.send("Page.crash"), 0.05)
 
 
-async def panel_away(screen: Screen) -> None:
+async def close_panel(screen: Screen) -> None:
     """Close the panel that contains the held button."""
     await screen.page.evaluate("() => document.querySelector('.rail [aria-pressed=true]').click()")
 
 
-async def moving(cell: Cell) -> bool:
+async def is_moving(cell: Cell) -> bool:
     speeds: list[float] = (await cell.command_fake("robot", "truth"))["qd"]
     return max(map(abs, speeds)) > 1e-3
 
 
 async def await_standstill(cell: Cell) -> None:
     """Wait for standstill. Fail if the robot moves again."""
-    began = own_time()
-    while await moving(cell):
-        assert not began.is_past(RESTS_WITHIN), "it does not stop"
-    end = time.monotonic() + STAYS
+    start = own_time()
+    while await is_moving(cell):
+        assert not start.is_past(STOP_TIMEOUT), "the robot does not stop"
+    end = time.monotonic() + STANDSTILL_TIME
     while time.monotonic() < end:
-        assert not await moving(cell), "it began again"
+        assert not await is_moving(cell), "the robot moves again"
 
 
 @pytest_asyncio.fixture(loop_scope="session")
@@ -87,7 +87,7 @@ async def online(cell: Cell) -> AsyncIterator[Client]:
     yield client
 
 
-async def panel(screen: Screen) -> None:
+async def open_jog_panel(screen: Screen) -> None:
     await screen.join("Eva")
     await screen.press(texts.ROBOT)
     await screen.page.get_by_role("complementary").get_by_role("radio", name=texts.HOLD_TO_MOVE).click()
@@ -96,12 +96,12 @@ async def panel(screen: Screen) -> None:
 async def hold(screen: Screen, cell: Cell) -> None:
     """Hold the button that moves the tool up, until the arm moves.
 
-    A press that ends by itself is made again, as a user would: the first one takes control, which may last
-    longer than a lease, and a page that is drawn by software on a busy machine may renew too late.
+    Press again if the hold ends by itself, as a user would. The first press takes control of the robot, which may take
+    longer than the deadman timeout, and a page rendered in software on a busy machine may renew the hold too late.
     """
     button = screen.page.locator(f"button[aria-label='{HOLD}']:not([aria-disabled])")
     end = time.monotonic() + 60
-    while not await moving(cell):
+    while not await is_moving(cell):
         assert time.monotonic() < end, "the arm does not move"
         if not await screen.page.locator("[data-held=true]").count():
             await screen.page.mouse.up()
@@ -112,8 +112,8 @@ async def hold(screen: Screen, cell: Cell) -> None:
 
 async def test_robot_stops_when_the_button_is_released(online: Client, cell: Cell, browser: Browser) -> None:
     async with screen_of(browser, cell.url) as screen:
-        await panel(screen)
-        for release in (let_go, lose_focus, panel_away):
+        await open_jog_panel(screen)
+        for release in (release_button, lose_focus, close_panel):
             await hold(screen, cell)
             await release(screen)
             await await_standstill(cell)
@@ -121,9 +121,11 @@ async def test_robot_stops_when_the_button_is_released(online: Client, cell: Cel
 
 
 @pytest.mark.parametrize("loss", [freeze, close, crash], ids=["freeze", "close", "crash"])
-async def test_robot_stops_when_the_page_is_gone(loss: Loss, online: Client, cell: Cell, browser: Browser) -> None:
+async def test_robot_stops_when_the_page_freezes_closes_or_crashes(
+    loss: PageLoss, online: Client, cell: Cell, browser: Browser
+) -> None:
     async with screen_of(browser, cell.url) as screen:
-        await panel(screen)
+        await open_jog_panel(screen)
         devtools = await screen.page.context.new_cdp_session(screen.page)
         await hold(screen, cell)
         try:
@@ -140,7 +142,7 @@ async def test_robot_stops_when_the_server_is_killed_and_stays_stopped(
 ) -> None:
     async with screen_of(browser, cell.url) as screen:
         screen.expected_errors = SERVER_GONE
-        await panel(screen)
+        await open_jog_panel(screen)
         await hold(screen, cell)
         await cell.kill("server")
         await await_standstill(cell)

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def made(cell: Cell) -> AsyncIterator[tuple[Client, Scene, Project]]:
+async def documents(cell: Cell) -> AsyncIterator[tuple[Client, Scene, Project]]:
     """A scene and a project, both closed, and a second client."""
     client = await cell.client("colleague")
     scene, project = await cell.open(client)
@@ -35,7 +35,7 @@ async def made(cell: Cell) -> AsyncIterator[tuple[Client, Scene, Project]]:
     yield client, scene, project
 
 
-async def more(screen: Screen, name: str, choice: str) -> None:
+async def choose_from_menu(screen: Screen, name: str, choice: str) -> None:
     await screen.press(f"More about {name}")
     await screen.page.get_by_role("menuitem", name=choice).click()
 
@@ -49,9 +49,9 @@ async def names(screen: Screen) -> list[str]:
 
 
 async def test_scenes_are_created_renamed_described_copied_and_deleted(
-    made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
+    documents: tuple[Client, Scene, Project], cell: Cell, browser: Browser
 ) -> None:
-    client, scene, project = made
+    client, scene, project = documents
     async with screen_of(browser, cell.url) as screen:
         await screen.join("Eva")
         await tab(screen, texts.SCENES)
@@ -66,7 +66,7 @@ async def test_scenes_are_created_renamed_described_copied_and_deleted(
         await screen.page.get_by_role("heading", name="Second cell").wait_for()
 
         # A name in use is reported in the field, before a request is sent.
-        await more(screen, "Second cell", "Rename…")
+        await choose_from_menu(screen, "Second cell", "Rename…")
         field = screen.page.get_by_label("New name of Second cell")
         await field.fill(scene.name)
         await screen.sees("This name is already in use.")
@@ -75,28 +75,28 @@ async def test_scenes_are_created_renamed_described_copied_and_deleted(
         await screen.page.get_by_role("heading", name="Cell 2").wait_for()
         assert {each.name for each in await client.call("ListScenes")} == {scene.name, "Cell 2"}
 
-        await more(screen, "Cell 2", "Describe…")
-        await screen.page.get_by_label("Description of Cell 2").fill("For tries.")
+        await choose_from_menu(screen, "Cell 2", "Describe…")
+        await screen.page.get_by_label("Description of Cell 2").fill("For trials.")
         await screen.press("Keep")
-        await until(lambda: _described(client, "For tries."), "described")
-        await expect(screen.page.locator(".card p.description").filter(has_text="For tries.")).to_be_visible()
+        await until(lambda: _described(client, "For trials."), "the description is stored")
+        await expect(screen.page.locator(".card p.description").filter(has_text="For trials.")).to_be_visible()
         second = next(each for each in await client.call("ListScenes") if each.name == "Cell 2")
 
-        await more(screen, "Cell 2", "Duplicate…")
+        await choose_from_menu(screen, "Cell 2", "Duplicate…")
         await screen.page.get_by_label("Name").fill("Cell 10")
         await screen.press(texts.DUPLICATE)
         await screen.page.get_by_role("heading", name="Cell 10").wait_for()
 
         # Natural sorting; search includes descriptions; favorites are stored per user.
         await screen.page.get_by_label("Sort by").select_option("name")
-        await until(lambda: _are(screen, ["Cell 2", "Cell 10", scene.name]), "sorted by name")
-        await screen.page.get_by_label("Search").fill("tries")
-        await until(lambda: _are(screen, ["Cell 2", "Cell 10"]), "found by description")
+        await until(lambda: _listed_names_are(screen, ["Cell 2", "Cell 10", scene.name]), "sorted by name")
+        await screen.page.get_by_label("Search").fill("trials")
+        await until(lambda: _listed_names_are(screen, ["Cell 2", "Cell 10"]), "found by description")
         await screen.page.get_by_label("Search").fill("")
         await screen.press("Add Cell 2 to favorites")
         await screen.press("Favorites only")
-        await until(lambda: _are(screen, ["Cell 2"]), "the star alone")
-        # The server stores it: the reloaded page has no memory.
+        await until(lambda: _listed_names_are(screen, ["Cell 2"]), "only the favorite is listed")
+        # The server stores favorites, so they survive a reload.
         await screen.page.reload()
         await tab(screen, texts.SCENES)
         await screen.page.get_by_role("button", name="Remove Cell 2 from favorites").wait_for()
@@ -104,13 +104,13 @@ async def test_scenes_are_created_renamed_described_copied_and_deleted(
         # Deletions by other users are shown.
         await client.call("DeleteScene", rpc.IdArgs(second.id))
         await expect(screen.page.get_by_role("heading", name="Cell 2")).to_have_count(0)
-        await more(screen, "Cell 10", "Delete…")
+        await choose_from_menu(screen, "Cell 10", "Delete…")
         await screen.press("Delete")
-        await until(lambda: _are(screen, [scene.name]), "deleted")
+        await until(lambda: _listed_names_are(screen, [scene.name]), "deleted")
         assert [each.name for each in await client.call("ListScenes")] == [scene.name]
 
-        # A scene in use names its projects and leads to them.
-        await more(screen, scene.name, "Delete…")
+        # The dialog for a scene in use lists its projects and opens them.
+        await choose_from_menu(screen, scene.name, "Delete…")
         await screen.sees("Delete the projects of this scene first")
         await screen.picture("home deletion")
         await screen.press(texts.open_document(project.name))
@@ -123,14 +123,14 @@ async def _described(client: Client, text: str) -> bool:
     return any(each.description == text for each in await client.call("ListScenes"))
 
 
-async def _are(screen: Screen, wanted: list[str]) -> bool:
+async def _listed_names_are(screen: Screen, wanted: list[str]) -> bool:
     return await names(screen) == wanted
 
 
-async def test_projects_of_a_scene_pictures_and_templates(
-    made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
+async def test_project_pictures_and_templates_are_shared(
+    documents: tuple[Client, Scene, Project], cell: Cell, browser: Browser
 ) -> None:
-    client, scene, project = made
+    client, scene, project = documents
     async with screen_of(browser, cell.url, drawn=True) as screen:
         await screen.join("Eva")
         await tab(screen, texts.SCENES)
@@ -157,20 +157,22 @@ async def test_projects_of_a_scene_pictures_and_templates(
         red = Image.new("RGB", (640, 480), (200, 30, 30))
         with io.BytesIO() as content:
             red.save(content, "PNG")
-            brought = content.getvalue()
-        own = screen.page.get_by_label(f"Picture of {project.name}")
-        await own.set_input_files({"name": "cell.png", "mimeType": "image/png", "buffer": brought})
+            png = content.getvalue()
+        picture_field = screen.page.get_by_label(f"Picture of {project.name}")
+        await picture_field.set_input_files({"name": "cell.png", "mimeType": "image/png", "buffer": png})
         shown = "id => document.querySelector(`.card[data-id='${id}'] img`)?.src"
-        await until(lambda: _own_is_shown(client, screen, project.id, shown), "the own picture is shown")
+        await until(
+            lambda: _uploaded_picture_is_shown(client, screen, project.id, shown), "the uploaded picture is shown"
+        )
         view_state = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.SHARED, project.id))
         assert await screen.page.evaluate(_COLOUR, view_state.values["picture"]) == pytest.approx([200, 30, 30], abs=6)
-        await own.set_input_files({"name": "letter.png", "mimeType": "image/png", "buffer": b"no picture"})
+        await picture_field.set_input_files({"name": "letter.png", "mimeType": "image/png", "buffer": b"no picture"})
         await screen.sees("The browser cannot read this picture file.")
-        await more(screen, project.name, "Use the 3D view as picture")
+        await choose_from_menu(screen, project.name, "Use the 3D view as picture")
         await screen.until(f"([id, taken]) => ({shown})(id) === taken", [project.id, view_state.values["thumbnail"]])
 
         # Templates are offered for new projects.
-        await more(screen, project.name, "Use as a template")
+        await choose_from_menu(screen, project.name, "Use as a template")
         await screen.page.locator(f".card[data-id='{project.id}']").get_by_text("template", exact=True).wait_for()
         await screen.press(texts.NEW_PROJECT)
         await screen.page.get_by_label("Start from").select_option(label=f"a copy of {project.name}")
@@ -178,19 +180,22 @@ async def test_projects_of_a_scene_pictures_and_templates(
         await screen.picture("home template")
         await screen.press(texts.CREATE)
         await screen.page.get_by_role("heading", name="From a template").wait_for()
-        made_of_it = next(each for each in await client.call("ListProjects") if each.name == "From a template")
-        copy = await client.call("GetProject", rpc.IdArgs(made_of_it.id))
+        created = next(each for each in await client.call("ListProjects") if each.name == "From a template")
+        copy = await client.call("GetProject", rpc.IdArgs(created.id))
         source = await client.call("GetProject", rpc.IdArgs(project.id))
         assert [each.name for each in copy.action_points] == [each.name for each in source.action_points]
         await screen.press(texts.CLOSE_DOCUMENT)
         await screen.page.get_by_label("Sort by").select_option("recent")
-        await until(lambda: _are(screen, ["From a template", project.name]), "the last opened first")
-        await client.call("DeleteProject", rpc.IdArgs(made_of_it.id))
-        await until(lambda: _are(screen, [project.name]), "deleted")
+        await until(
+            lambda: _listed_names_are(screen, ["From a template", project.name]),
+            "the project that was opened last is first",
+        )
+        await client.call("DeleteProject", rpc.IdArgs(created.id))
+        await until(lambda: _listed_names_are(screen, [project.name]), "deleted")
 
         await screen.press(f"Scene of {project.name}")
         await screen.page.get_by_role("button", name=texts.open_document(scene.name)).wait_for()
-        await more(screen, scene.name, "New project…")
+        await choose_from_menu(screen, scene.name, "New project…")
         await screen.page.get_by_label("Name").fill("From the scene")
         await screen.press(texts.CREATE)
         await screen.sees(f"on {scene.name} ·")
@@ -210,16 +215,16 @@ _COLOUR = """async (address) => {
 """Average colour of a picture."""
 
 
-async def _own_is_shown(client: Client, screen: Screen, document: str, shown: str) -> bool:
+async def _uploaded_picture_is_shown(client: Client, screen: Screen, document: str, shown: str) -> bool:
     view_state = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.SHARED, document))
-    own: str | None = view_state.values.get("picture")
-    return own is not None and await screen.page.evaluate(shown, document) == own
+    uploaded: str | None = view_state.values.get("picture")
+    return uploaded is not None and await screen.page.evaluate(shown, document) == uploaded
 
 
 async def test_packages_are_listed_live_downloaded_uploaded_and_run(
-    made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
+    documents: tuple[Client, Scene, Project], cell: Cell, browser: Browser
 ) -> None:
-    client, _, project = made
+    client, _, project = documents
     async with screen_of(browser, cell.url) as screen:
         await screen.join("Eva")
         await tab(screen, texts.PACKAGES)
@@ -236,28 +241,28 @@ async def test_packages_are_listed_live_downloaded_uploaded_and_run(
         await screen.page.get_by_role("heading", name="sorting 1").wait_for()
         await screen.sees("not run yet")
         async with screen.page.expect_download() as downloading:
-            await more(screen, "sorting 1", "Download")
+            await choose_from_menu(screen, "sorting 1", "Download")
         file = await (await downloading.value).path()
         content = file.read_bytes()
         assert content[:2] == b"PK"
 
         await screen.page.locator("input[type=file]").set_input_files(
-            {"name": "brought.zip", "mimeType": "application/zip", "buffer": content}
+            {"name": "copy.zip", "mimeType": "application/zip", "buffer": content}
         )
-        await bar.locator(".task").filter(has_text="Uploading the package brought").wait_for()
-        await screen.sees("Uploaded brought.zip.")
-        await until(lambda: _packages(client, 2), "the package is there twice")
+        await bar.locator(".task").filter(has_text="Uploading the package copy").wait_for()
+        await screen.sees("Uploaded copy.zip.")
+        await until(lambda: _packages(client, 2), "both packages are listed")
         await expect(screen.page.locator(".card")).to_have_count(2)
-        brought = next(each for each in await client.call("ListPackages") if each.id == "brought")
-        await client.call("RenamePackage", rpc.RenamePackageArgs(brought.id, "from a file"))
+        copy = next(each for each in await client.call("ListPackages") if each.id == "copy")
+        await client.call("RenamePackage", rpc.RenamePackageArgs(copy.id, "from a file"))
         await screen.page.get_by_role("heading", name="from a file").wait_for()
-        await more(screen, "from a file", "Delete…")
+        await choose_from_menu(screen, "from a file", "Delete…")
         await screen.press("Delete")
-        await until(lambda: _packages(client, 1), "it is deleted")
+        await until(lambda: _packages(client, 1), "the copy is deleted")
         await expect(screen.page.locator(".card")).to_have_count(1)
 
-        # It is started paused from its tile. Afterwards the tile shows the last run.
-        await more(screen, "sorting 1", texts.START_PAUSED)
+        # The package is started paused from its tile. Afterwards the tile shows the last run.
+        await choose_from_menu(screen, "sorting 1", texts.START_PAUSED)
         program = screen.page.get_by_role("group", name=texts.PROGRAM_STATE)
         await program.get_by_text("Paused").wait_for()
         await screen.picture("home package paused")
@@ -280,16 +285,16 @@ LAMP = """from arcor2_hw.objects import GenericWithPose
 
 
 class %s(GenericWithPose):
-    \"\"\"A lamp of its own kind.\"\"\"
+    \"\"\"A lamp.\"\"\"
 
     _ABSTRACT = False
 """
 
 
 async def test_problems_are_shown_on_tiles_and_fixed_from_there(
-    made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
+    documents: tuple[Client, Scene, Project], cell: Cell, browser: Browser
 ) -> None:
-    client, _, _ = made
+    client, _, _ = documents
     async with httpx.AsyncClient(timeout=60, base_url=cell.url.replace("ws", "http", 1)) as rest:
         for kind in ("Lamp", "Torch", "Spare"):
             source = {"id": kind, "name": kind, "source": LAMP % kind, "description": ""}
@@ -317,7 +322,7 @@ async def test_problems_are_shown_on_tiles_and_fixed_from_there(
             await screen.sees("Not used in any saved scene.")
             await delete.click()
             await screen.press("Delete")
-            await until(lambda: _known(client, "Spare", there=False), "the kind is deleted")
+            await until(lambda: _type_exists(client, "Spare", expected=False), "the type is deleted")
             await expect(panel.get_by_role("button", name="Spare")).to_have_count(0)
 
             scene = await _listed(client, "lamps")
@@ -348,7 +353,7 @@ async def test_problems_are_shown_on_tiles_and_fixed_from_there(
             await card.get_by_text("2 problems").click()
             await screen.press("Repair lamps")
             await screen.sees("are removed from the scene: lamp, torch.")
-            await screen.picture("home mending")
+            await screen.picture("home repair")
             await screen.press("Remove objects")
             await screen.sees("lamps can be opened again.")
             await screen.page.get_by_role("heading", name="lamps backup").wait_for()
@@ -367,8 +372,8 @@ async def _listed(client: Client, name: str) -> ListScenesData | None:
     return next((each for each in await client.call("ListScenes") if each.name == name), None)
 
 
-async def _known(client: Client, kind: str, *, there: bool) -> bool:
-    return (kind in {each.type for each in await client.call("GetObjectTypes")}) is there
+async def _type_exists(client: Client, kind: str, *, expected: bool) -> bool:
+    return (kind in {each.type for each in await client.call("GetObjectTypes")}) is expected
 
 
 async def _packages(client: Client, count: int) -> bool:

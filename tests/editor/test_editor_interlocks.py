@@ -16,7 +16,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 ZONE = "inside"
 
 
-async def with_body(client: Client, cell: Cell) -> None:
+async def add_zone_body(client: Client, cell: Cell) -> None:
     """Open the scene, and add the body of a zone."""
     scene, _ = await cell.open(client)
     await client.call("CloseProject")
@@ -26,8 +26,8 @@ async def with_body(client: Client, cell: Cell) -> None:
     await client.call("AddVirtualCollisionObjectToScene", rpc.AddVirtualCollisionObjectToSceneArgs(ZONE, pose, model))
 
 
-async def set_up(page: Page, screen: Screen) -> None:
-    """Add the interlock `Door` of the zone by taps."""
+async def add_interlock(page: Page, screen: Screen) -> None:
+    """Add the interlock `Door` of the zone on the screen."""
     await screen.press("Add interlock")
     await page.get_by_label("Name", exact=True).fill("Door")
     await page.get_by_label("Body of the zone").select_option(ZONE)
@@ -38,14 +38,14 @@ async def set_up(page: Page, screen: Screen) -> None:
 
 async def test_an_interlock_is_set_up_and_shown_live(cell: Cell, browser: Browser) -> None:
     client = await cell.client("colleague")
-    await with_body(client, cell)
+    await add_zone_body(client, cell)
     await client.call("StartScene")
     async with screen_of(browser, cell.url, touch=True) as screen:
         page = screen.page
         await screen.join("Eva")
         await page.get_by_role("button", name=texts.DEVICES).click()
         await screen.press("Interlocks and zones")
-        await set_up(page, screen)
+        await add_interlock(page, screen)
         await screen.settle()
         assert await screen.faults() == []
         await screen.picture("interlock-form")

@@ -1,4 +1,4 @@
-"""What the panel Devices opens: mode and authority of the cell, and the page of inputs and outputs."""
+"""Pages that the panel Devices opens: mode and authority of the cell, and the page of inputs and outputs."""
 
 import re
 from pathlib import Path
@@ -26,7 +26,7 @@ TREND_PIXELS = """(canvas) => {
 """Number of pixels in the colour of the first line."""
 
 
-async def with_lamp(client: Client, cell: Cell) -> None:
+async def add_lamp(client: Client, cell: Cell) -> None:
     """Add a lamp of the type in the how-to guide to the scene, and go online."""
     source = PAGE.read_text().partition("```python\n")[2].partition("```")[0]
     await client.rest.put_object_type("Lamp", source)
@@ -37,7 +37,7 @@ async def with_lamp(client: Client, cell: Cell) -> None:
     await client.call("StartScene")
 
 
-async def changes_the_mode(screen: Screen, client: Client) -> None:
+async def change_the_mode(screen: Screen, client: Client) -> None:
     """Change the mode in the panel Devices and back, and read why the PLC cannot have the authority."""
     await screen.press("Mode and authority")
     dialog = screen.page.get_by_role("dialog", name="Mode and authority")
@@ -56,7 +56,7 @@ async def changes_the_mode(screen: Screen, client: Client) -> None:
     await dialog.get_by_role("button", name="Close").click()
 
 
-async def shows_the_history(screen: Screen) -> None:
+async def show_the_history(screen: Screen) -> None:
     """Open the history of the lamp, which has been off, over an hour and over a day."""
     await screen.press("History of signal: lamp")
     dialog = screen.page.get_by_role("dialog", name="History of signal: lamp")
@@ -64,7 +64,7 @@ async def shows_the_history(screen: Screen) -> None:
     chart = dialog.get_by_role("img", name="signal: lamp").locator("canvas")
     before = await chart.element_handle()
     async with screen.page.expect_response(lambda response: "/api/history/summary" in response.url):
-        pass  # it follows the present by itself, in the same chart
+        pass  # the chart follows the present without being replaced
     assert await chart.evaluate("(canvas, before) => canvas === before", before)
     await screen.picture("point-history-hour")
     await dialog.get_by_role("radio", name="1 day").click()
@@ -72,19 +72,19 @@ async def shows_the_history(screen: Screen) -> None:
     await screen.settle()
     assert await screen.faults() == []
     assert await screen.barriers() == []
-    assert await dialog.locator(".trend-chart canvas").evaluate(TREND_PIXELS), "a single part is a dot"
+    assert await dialog.locator(".trend-chart canvas").evaluate(TREND_PIXELS), "a single value is drawn as a dot"
     await screen.picture("point-history")
     await dialog.get_by_role("button", name="Close").click()
 
 
-async def test_an_output_is_forced_and_an_operator_ends_it(cell: Cell, browser: Browser) -> None:
+async def test_an_output_is_forced_and_an_operator_ends_the_force(cell: Cell, browser: Browser) -> None:
     colleague = await cell.client("colleague")
-    await with_lamp(colleague, cell)
+    await add_lamp(colleague, cell)
     async with screen_of(browser, cell.url, touch=True) as screen, screen_of(browser, cell.url, "phone") as phone:
         page, other = screen.page, phone.page
         await screen.join("Eva")
         await page.get_by_role("button", name=texts.DEVICES).click()
-        await changes_the_mode(screen, colleague)
+        await change_the_mode(screen, colleague)
         await screen.press("Inputs and outputs")
         tester = page.get_by_role("region", name="tester")
         row = tester.get_by_role("listitem").filter(has_text="door open")
@@ -101,7 +101,7 @@ async def test_an_output_is_forced_and_an_operator_ends_it(cell: Cell, browser: 
         await screen.sees("The device would keep a forced value")
 
         await page.get_by_placeholder("Search device or point").fill("lamp")
-        await shows_the_history(screen)
+        await show_the_history(screen)
         await screen.press("Force signal: lamp")
         await screen.press("Force on")
         lamp = page.get_by_role("region", name="signal").get_by_role("listitem")
@@ -124,7 +124,7 @@ async def test_an_output_is_forced_and_an_operator_ends_it(cell: Cell, browser: 
         await expect(banner).to_have_count(0)
         await expect(lamp.locator(".io-value")).to_have_text("off")
 
-        # Back leads to where the page was opened from.
+        # Back returns to the page from which it was opened.
         await phone.press("Inputs and outputs")
         await expect(other.get_by_role("heading", name="Inputs and outputs")).to_be_visible()
         await phone.press("Back")

@@ -41,7 +41,7 @@ def secret(server: ServerProcess, role: Role) -> str:
     return tokens.add(f"{role.name.lower()} {len(tokens.all())}", role)[1]
 
 
-async def home(screen: Screen) -> None:
+async def wait_for_home(screen: Screen) -> None:
     await screen.page.get_by_role("radio", name=texts.PROJECTS).wait_for()
 
 
@@ -52,13 +52,13 @@ async def test_token_is_requested_remembered_and_revoked(server: ServerProcess, 
         await field.fill("not-a-token")
         await screen.press(texts.JOIN)
         await screen.sees("The token is not valid")
-        made, key = TokenFile(server.data_dir).add("Eva's tablet", Role.TECHNICIAN)
+        token, key = TokenFile(server.data_dir).add("Eva's tablet", Role.TECHNICIAN)
         await field.fill(key)
         await screen.press(texts.JOIN)
-        await home(screen)
+        await wait_for_home(screen)
         await screen.page.reload()
-        await home(screen)
-        TokenFile(server.data_dir).revoke(made.name)
+        await wait_for_home(screen)
+        TokenFile(server.data_dir).revoke(token.name)
         await screen.sees("no longer valid")
         await field.wait_for()
 
@@ -66,14 +66,16 @@ async def test_token_is_requested_remembered_and_revoked(server: ServerProcess, 
 async def test_token_in_the_address_is_used_and_removed(server: ServerProcess, browser: Browser) -> None:
     async with screen_of(browser, server.url) as screen:
         await screen.join("Operator", f"/?token={secret(server, Role.OPERATOR)}&q=low#/")
-        await home(screen)
+        await wait_for_home(screen)
         assert "token" not in screen.page.url
         # An operator cannot create scenes; the button is disabled.
         await screen.page.get_by_role("radio", name=texts.SCENES).click()
         await expect(screen.page.get_by_role("button", name=texts.NEW_SCENE)).to_be_disabled()
 
 
-async def test_a_refused_websocket_is_told_apart_from_a_stopped_server(server: ServerProcess, browser: Browser) -> None:
+async def test_a_refused_websocket_is_distinguished_from_a_stopped_server(
+    server: ServerProcess, browser: Browser
+) -> None:
     """A browser may trust the page, but not its websocket, if the certificate is not installed."""
     async with screen_of(browser, server.url) as screen:
         await screen.page.add_init_script(
@@ -94,7 +96,7 @@ async def test_name_in_use_is_refused_and_returning_users_join_by_one_tap(
         for screen in (one, two):
             await screen.join("Adam", f"/?token={key}&q=low")
             if screen is one:
-                await home(one)
+                await wait_for_home(one)
         await two.sees("The user name 'Adam' is already in use.")
         loading = asyncio.Event()
 
@@ -105,26 +107,26 @@ async def test_name_in_use_is_refused_and_returning_users_join_by_one_tap(
         await two.page.route("**/assets/menu-*.js", load)
         await two.page.get_by_label(texts.YOUR_NAME).fill("Berta")
         await two.press(texts.JOIN)
-        await home(two)
+        await wait_for_home(two)
         await one.page.get_by_role("img", name="Berta").wait_for()
         assert await one.page.get_by_role("img", name="Adam (you)").is_visible()
         # On a shared tablet, returning users join with one tap.
         await two.press(texts.SETTINGS)
-        loading.set()  # a menu that was asked for before it is loaded opens, too
+        loading.set()  # a menu opens even if it is pressed before its code is loaded
         await two.page.get_by_role("menuitem", name="Leave (you are Berta)").click()
         people = two.page.get_by_role("group", name="Recent users")
         assert await people.get_by_role("button").all_inner_texts() == ["Berta"]  # not the refused name
         assert await two.faults() == []
-        await two.picture("who was here")
+        await two.picture("recent users")
         await two.press("Join as Berta")
-        await home(two)
+        await wait_for_home(two)
 
 
 async def test_diagnosis_file_is_saved(server: ServerProcess, browser: Browser) -> None:
     async with screen_of(browser, server.url) as screen:
         key = secret(server, Role.TECHNICIAN)
         await screen.join("Dora", f"/?token={key}&q=low")
-        await home(screen)
+        await wait_for_home(screen)
         await screen.page.get_by_role("radio", name=texts.SCENES).click()
         await screen.page.keyboard.press("?")
         await screen.sees("accepts connections from this computer only")
@@ -147,7 +149,7 @@ async def test_diagnosis_file_is_saved(server: ServerProcess, browser: Browser) 
 async def test_invitation_shows_the_fingerprint_of_the_tls_certificate(
     tmp_path: Path, built_editor: Path, browser: Browser
 ) -> None:
-    """As for a tablet on the network, except for the address."""
+    """The server listens on the network, as for a tablet. The test uses its loopback address."""
     data_dir = tmp_path / "data"
     key = TokenFile(data_dir).add("tablet", Role.TECHNICIAN)[1]
     async with running(data_dir, "--host", "0.0.0.0") as server:
@@ -160,13 +162,13 @@ async def test_invitation_shows_the_fingerprint_of_the_tls_certificate(
             assert await screen.page.evaluate("window.isSecureContext")
             await screen.page.get_by_label(texts.YOUR_NAME).fill("Tess")
             await screen.press(texts.JOIN)
-            await home(screen)
+            await wait_for_home(screen)
             await screen.page.keyboard.press("?")
             about = screen.page.get_by_role("dialog", name="About")
             invitation = about.get_by_role("region", name="Invite others")
             shown = (await invitation.locator(".fingerprint code").inner_text()).replace(":", "")
             trust = invitation.locator(".trust")
-            invited = await _joining(screen)
+            invited = await _join_options(screen)
             code = invitation.get_by_role("img")
             if invited["addresses"]:  # the machine is on a network
                 picture = cv2.imdecode(np.frombuffer(await code.screenshot(), np.uint8), cv2.IMREAD_COLOR)
@@ -198,8 +200,8 @@ async def test_invitation_shows_the_fingerprint_of_the_tls_certificate(
         assert shown in logged
 
 
-async def _joining(screen: Screen) -> dict[str, list[str]]:
-    """Return how others can join, as the server answers."""
+async def _join_options(screen: Screen) -> dict[str, list[str]]:
+    """Return the ways to join that the server offers."""
     ask = "key => fetch('/api/joining', {headers: {Authorization: `Bearer ${key}`}}).then(found => found.json())"
     key = await screen.page.evaluate("localStorage.getItem('arcor2-hw.token')")
     found: dict[str, list[str]] = await screen.page.evaluate(ask, key)

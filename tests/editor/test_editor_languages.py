@@ -44,10 +44,10 @@ DEFINED_BY_DEVICES = {
 """Names in models of robots, and values of settings."""
 GERMAN, CZECH = Words("de"), Words("cs")
 LANGUAGES = {"pseudo": ("phone", "ipad"), "cs": ("phone",), "de": ("ipad",)}
-"""The sizes in which each language is shown with `--matrix`. Without it, only the first of the first is."""
+"""Viewports of each language with `--matrix`. Without it, only the first viewport of the first language is used."""
 DARK = "cs"
-LONGER = "label-content-name-mismatch"
-"""A rule that the pseudo-locale breaks: a short text is not lengthened, but as a part of a longer label."""
+LABEL_RULE = "label-content-name-mismatch"
+"""A rule that the pseudo-locale breaks: it lengthens a short text only as part of a longer label."""
 ADDRESSES = {*JOINING["addresses"], JOINING["addresses"][0].replace("https", "http")}
 FUNCTIONS = {"open_lid", "fetch", "grip", "count", "prepare"}
 PEOPLE = {"colleague", "helper", "CO", "HE", *(f"Visitor {each}" for each in LANGUAGES), "VP", "VC", "VD"}
@@ -96,7 +96,7 @@ async def test_language_follows_the_browser_and_is_then_stored_with_the_user(
             await page.keyboard.type(typed)
             await page.keyboard.press("Enter")
             await expect(number).to_have_text(f"{typed.replace('.', ',')} mm")
-        # Switched where the user is, without a reload: the view stays as it is.
+        # The language changes without a reload, and the view stays as it is.
         await page.evaluate("() => { window.sameEngine = window.__engine; }")
         await choose(page, GERMAN, "English")
         await tools.get_by_role("button", name=texts.POINTS, exact=True).wait_for()
@@ -105,11 +105,11 @@ async def test_language_follows_the_browser_and_is_then_stored_with_the_user(
         await tools.get_by_role("button", name=CZECH(texts.POINTS), exact=True).wait_for()
         assert await page.evaluate(html) == "cs"
         assert await page.evaluate("() => window.sameEngine === window.__engine")
-        # A message in the dock may have a button of this name, too.
+        # A message in the dock may have a button with this name, too.
         await page.get_by_role("button", name=CZECH(texts.CLOSE_DOCUMENT), exact=True).first.click()
         await page.get_by_role("button", name=CZECH(texts.DISCARD_CHANGES)).click()
         await page.get_by_role("heading", name=CZECH(texts.HOME_HEADING)).wait_for()
-    # On another device of the user, whose browser is in English.
+    # The language also applies on another device of the user, whose browser is in English.
     async with screen_of(browser, module_cell.url) as screen:
         await screen.join("Jana")
         await screen.page.get_by_role("heading", name=CZECH(texts.HOME_HEADING)).wait_for()
@@ -132,7 +132,7 @@ class Visitor:
         self._sizes = list(sizes)
 
     async def faults(self, screens: AsyncIterator[str], *, axe: bool) -> list[str]:
-        """Visit these screens, each in all sizes; the next one is opened in the size of the last."""
+        """Return the faults of these screens in all sizes. The next screen is opened in the size of the last check."""
         found = []
         async for shown in screens:
             faults = list(await untranslated(self.screen.page, self.names)) if self.pseudo else []
@@ -146,7 +146,7 @@ class Visitor:
                 await self.screen.picture(f"{self.language} {shown} {size}")
             if axe:
                 barriers = await self.screen.barriers()
-                faults += [each for each in barriers if not (self.pseudo and each.startswith(LONGER))]
+                faults += [each for each in barriers if not (self.pseudo and each.startswith(LABEL_RULE))]
             self._sizes.reverse()
             found += [f"{self.language}, {shown}: {fault}" for fault in faults]
         return found
@@ -163,7 +163,7 @@ async def visitors(
             locale = LOCALE if language == "pseudo" else language
             opened = screen_of(browser, module_cell.url, sizes[0], touch=True, locale=locale, dark=language == DARK)
             screen = await stack.enter_async_context(opened)
-            # Refused requests on purpose.
+            # The tour sends requests that the server refuses.
             screen.expected_errors = ("409 (Conflict)", "400 (Bad Request)", "404 (Not Found)")
             if language == "pseudo":
                 await use_pseudo_locale(screen.page)
@@ -209,18 +209,20 @@ async def calibrate(client: Client, object_id: str, begin: Awaitable[None]) -> N
     await client.write_unlock(object_id)
 
 
-async def test_home(visitors: list[Visitor]) -> None:
+async def test_home_is_translated(visitors: list[Visitor]) -> None:
     await visit(visitors, lambda each: each.tour.home())
 
 
-async def test_guided_tour(visitors: list[Visitor], client: Client) -> None:
+async def test_guided_tour_is_translated(visitors: list[Visitor], client: Client) -> None:
     try:
         await visit(visitors[:1], lambda each: each.tour.guided(), axe=True)
     finally:
         await client.close_project(force=True)
 
 
-async def test_scene(visitors: list[Visitor], client: Client, documents: tuple[Scene, Project]) -> None:
+async def test_scene_editor_is_translated(
+    visitors: list[Visitor], client: Client, documents: tuple[Scene, Project]
+) -> None:
     await client.open_scene(documents[0].id)
     try:
         await visit(visitors, lambda each: each.tour.scene_editor())
@@ -228,7 +230,9 @@ async def test_scene(visitors: list[Visitor], client: Client, documents: tuple[S
         await client.close_scene(force=True)
 
 
-async def test_project(visitors: list[Visitor], client: Client, documents: tuple[Scene, Project]) -> None:
+async def test_project_editor_is_translated(
+    visitors: list[Visitor], client: Client, documents: tuple[Scene, Project]
+) -> None:
     await client.open_project(documents[1].id)
     try:
         await visit(visitors, lambda each: each.tour.project_editor())
@@ -240,27 +244,31 @@ async def test_project(visitors: list[Visitor], client: Client, documents: tuple
         await client.close_project(force=True)
 
 
-async def test_functions(visitors: list[Visitor], client: Client, documents: tuple[Scene, Project]) -> None:
+async def test_function_editor_is_translated(
+    visitors: list[Visitor], client: Client, documents: tuple[Scene, Project]
+) -> None:
     project = documents[1]
     actions = {action.name: action.id for action in project.all_actions()}
     await client.open_project(project.id)
     try:
-        made = {
+        functions = {
             name: await client.call("MakeFunction", rpc.MakeFunctionArgs(name, [actions[used]]))
             for name, used in (("open_lid", "open"), ("fetch", "pick"), ("grip", "close"))
         }
         count = rpc.AddFunctionParameterArgs(
-            made["grip"].function_id, "count", "integer", Parameter("count", "integer", "1")
+            functions["grip"].function_id, "count", "integer", Parameter("count", "integer", "1")
         )
         await client.call("AddFunctionParameter", count)
-        at_once = [made[name].action_id for name in ("open_lid", "fetch")]
-        await client.call("MakeParallel", rpc.MakeParallelArgs("prepare", at_once))
+        parallel_calls = [functions[name].action_id for name in ("open_lid", "fetch")]
+        await client.call("MakeParallel", rpc.MakeParallelArgs("prepare", parallel_calls))
         await visit(visitors, lambda each: each.tour.functions("grip", "prepare"))
     finally:
         await client.close_project(force=True)
 
 
-async def test_running_program(visitors: list[Visitor], client: Client, module_cell: Cell) -> None:
+async def test_screens_of_a_running_program_are_translated(
+    visitors: list[Visitor], client: Client, module_cell: Cell
+) -> None:
     (package,) = await client.list_packages()
     await client.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
     while (await client.next_event("PackageState")).data.state is not PackageStateEnum.PAUSED:
@@ -274,7 +282,7 @@ async def test_running_program(visitors: list[Visitor], client: Client, module_c
     await visit(visitors, lambda each: each.tour.failed())
 
 
-async def test_calibration(visitors: list[Visitor], client: Client, module_cell: Cell) -> None:
+async def test_calibration_screens_are_translated(visitors: list[Visitor], client: Client, module_cell: Cell) -> None:
     async with camera_of(module_cell, width=640, height=360):
         ids = await new_scene(module_cell, client)
         try:

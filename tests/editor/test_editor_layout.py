@@ -1,7 +1,7 @@
-"""Layout of every screen, light and dark, with large text, a wide font, and in two sizes a narrow one.
+"""Layout of every screen, light and dark, with large text, with a wide font, and in two sizes with a narrow font.
 
-Controls that are too small, covered, off the screen or overlapping are searched for on a phone and on a tablet in both
-directions, with `--matrix` in all sizes; accessibility violations (axe) in one size, in light and dark by turns.
+No control may be too small, covered, off the screen or overlapping on a phone and on a tablet in both orientations, and
+with `--matrix` in all sizes. Accessibility violations (axe) are checked in one size, alternately in light and dark.
 """
 
 from collections.abc import AsyncIterator, Iterable
@@ -29,18 +29,18 @@ async def project(cell: Cell) -> AsyncIterator[Project]:
 
 
 FEW = ("phone", "tablet")
-"""Sizes for screens that differ by their panel alone: a sheet from below, or at the side."""
+"""Sizes for screens that differ only in their panel: a sheet at the bottom or at the side."""
 
 
 class ScreenFaults:
-    """Collects the faults of each screen, of one in dark colours and of the next in light ones."""
+    """Collects the layout faults of each screen, alternately in dark and light colours."""
 
     def __init__(self, screen: Screen, *, dark: bool = True) -> None:
         self.screen = screen
-        self.found: dict[str, list[str]] = {}
+        self.faults: dict[str, list[str]] = {}
         self._dark = not dark
 
-    async def at(self, what: str, sizes: Iterable[str]) -> None:
+    async def check(self, label: str, sizes: Iterable[str]) -> None:
         """Check the screen in these sizes."""
         page = self.screen.page
         self._dark = not self._dark
@@ -50,32 +50,32 @@ class ScreenFaults:
             for name in in_sizes:
                 await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
                 await self.screen.settle()
-                await self._note(f"{what}, {name}, {font} font", await self.screen.faults())
+                await self._note(f"{label}, {name}, {font} font", await self.screen.faults())
                 if font == "wide":
-                    await self.screen.picture(f"{what} {name}{' dark' if self._dark else ''}")
+                    await self.screen.picture(f"{label} {name}{' dark' if self._dark else ''}")
         await self.screen.use_font()
         await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
         await self.screen.settle()
-        await self._note(f"{what}, {'dark' if self._dark else 'light'}", await self.screen.barriers())
+        await self._note(f"{label}, {'dark' if self._dark else 'light'}", await self.screen.barriers())
 
-    async def with_large_text(self, what: str) -> None:
+    async def check_with_large_text(self, label: str) -> None:
         """Check the screen with text of twice the size."""
         page = self.screen.page
         await page.evaluate("() => { document.documentElement.style.fontSize = '200%'; }")
         await self.screen.settle()
-        await self._note(f"{what}, large text", await self.screen.faults_with(FONTS))
-        await self.screen.picture(f"{what} large text")
+        await self._note(f"{label}, large text", await self.screen.faults_with(FONTS))
+        await self.screen.picture(f"{label} large text")
         await page.evaluate("() => { document.documentElement.style.fontSize = ''; }")
 
     def report(self) -> str:
-        return "\n".join(f"{where}: {fault}" for where, faults in self.found.items() for fault in faults)
+        return "\n".join(f"{where}: {fault}" for where, faults in self.faults.items() for fault in faults)
 
     async def _note(self, where: str, faults: list[str]) -> None:
         if faults:
-            self.found[where] = faults
+            self.faults[where] = faults
 
 
-async def at_the_project(screen: Screen, name: str, project: Project) -> None:
+async def join_and_open(screen: Screen, name: str, project: Project) -> None:
     """Join, and open the project unless it is open."""
     await screen.join(name)
     if await screen.until("() => document.querySelector('.home, .workplace')?.className") == "home":
@@ -88,80 +88,82 @@ async def open_tool(screen: Screen, name: str) -> None:
     await screen.page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
 
 
-async def test_join_and_home(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
+async def test_join_and_home_screens_have_no_layout_faults(
+    cell: Cell, project: Project, browser: Browser, sizes: list[str]
+) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
-        looks = ScreenFaults(screen)
+        found = ScreenFaults(screen)
         page = screen.page
         await page.goto(f"{screen.url}/?q=low")
         await page.get_by_label(texts.YOUR_NAME).wait_for()
-        await looks.at("join", sizes)
-        await looks.with_large_text("join")
+        await found.check("join", sizes)
+        await found.check_with_large_text("join")
         await page.get_by_label(texts.YOUR_NAME).fill("colleague")
         await screen.press(texts.JOIN)
         await screen.sees("already in use")
-        await looks.at("join refused", FEW)
+        await found.check("join refused", FEW)
         await screen.join("Eva")
         await screen.sees("on PCB testing")
-        await looks.at("home", sizes)
-        await looks.with_large_text("home")
+        await found.check("home", sizes)
+        await found.check_with_large_text("home")
         await page.get_by_role("radio", name=texts.SCENES).click()
         await screen.press(texts.NEW_SCENE)
         await page.get_by_role("dialog").wait_for()
-        await looks.at("dialog", FEW)
+        await found.check("dialog", FEW)
         await page.keyboard.press("Escape")
         await page.get_by_role("radio", name=texts.PACKAGES).click()
-        await looks.at("empty list", FEW)
-        assert not looks.found, looks.report()
+        await found.check("empty list", FEW)
+        assert not found.faults, found.report()
 
 
 @asynccontextmanager
-async def at_work(
+async def project_on_tablet(
     cell: Cell, project: Project, browser: Browser, *, dark: bool
 ) -> AsyncIterator[tuple[Screen, ScreenFaults]]:
     """Open the project on a tablet. `dark`: colours of the first screen. Fails at the end if the layout had faults."""
     async with screen_of(browser, cell.url, touch=True) as screen:
-        await at_the_project(screen, "Adam", project)
-        looks = ScreenFaults(screen, dark=dark)
-        yield screen, looks
-        assert not looks.found, looks.report()
+        await join_and_open(screen, "Adam", project)
+        found = ScreenFaults(screen, dark=dark)
+        yield screen, found
+        assert not found.faults, found.report()
 
 
-async def test_the_workplace(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
-    async with at_work(cell, project, browser, dark=True) as (_, looks):
-        await looks.at("workplace", sizes)
-        await looks.with_large_text("workplace")
+async def test_workplace_has_no_layout_faults(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
+    async with project_on_tablet(cell, project, browser, dark=True) as (_, found):
+        await found.check("workplace", sizes)
+        await found.check_with_large_text("workplace")
 
 
-async def test_the_tools(cell: Cell, project: Project, browser: Browser) -> None:
-    async with at_work(cell, project, browser, dark=False) as (screen, looks):
+async def test_tool_panels_have_no_layout_faults(cell: Cell, project: Project, browser: Browser) -> None:
+    async with project_on_tablet(cell, project, browser, dark=False) as (screen, found):
         for name in texts.TOOLS:
             await open_tool(screen, name)
-            await looks.at(name.lower(), FEW)
+            await found.check(name.lower(), FEW)
 
 
-async def test_the_selection(cell: Cell, project: Project, browser: Browser) -> None:
-    async with at_work(cell, project, browser, dark=False) as (screen, looks):
+async def test_selection_panels_have_no_layout_faults(cell: Cell, project: Project, browser: Browser) -> None:
+    async with project_on_tablet(cell, project, browser, dark=False) as (screen, found):
         page = screen.page
         action = project.action_points[0].actions[0].name
         point = project.action_points[0].name
-        for name, kind, what in ((point, "Action point", "point"), (action, "Action", "action")):
+        for name, kind, label in ((point, "Action point", "point"), (action, "Action", "action")):
             await open_tool(screen, texts.OBJECTS)
             await page.get_by_role("row", name=f"{name} {kind}", exact=True).click()
             await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
             await page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
-            await looks.at(f"{what} selected", FEW)
+            await found.check(f"{label} selected", FEW)
             await screen.press(texts.CLOSE_PANEL)
 
 
-async def test_search_and_views(cell: Cell, project: Project, browser: Browser) -> None:
-    async with at_work(cell, project, browser, dark=False) as (screen, looks):
+async def test_search_and_views_have_no_layout_faults(cell: Cell, project: Project, browser: Browser) -> None:
+    async with project_on_tablet(cell, project, browser, dark=False) as (screen, found):
         page = screen.page
         action = project.action_points[0].actions[0].name
         # Search by name.
         await page.keyboard.press("/")
         search = page.get_by_role("dialog", name="Find a command or an object")
         await search.get_by_role("option", name="Show all in the view").wait_for()
-        await looks.at("search", FEW)
+        await found.check("search", FEW)
         await page.keyboard.type(f"{action} act")
         await search.get_by_role("option").first.get_by_text(action, exact=True).wait_for()
         await page.keyboard.press("ArrowDown")
@@ -171,30 +173,34 @@ async def test_search_and_views(cell: Cell, project: Project, browser: Browser) 
         for name in ("Flow", "Code", "3D"):
             await page.get_by_role("radio", name=name, exact=True).click()
             await screen.settle()
-            await looks.at(f"shown as {name}", FEW)
+            await found.check(f"shown as {name}", FEW)
 
 
-async def test_online(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
-    async with at_work(cell, project, browser, dark=False) as (screen, looks):
+async def test_online_workplace_has_no_layout_faults(
+    cell: Cell, project: Project, browser: Browser, sizes: list[str]
+) -> None:
+    async with project_on_tablet(cell, project, browser, dark=False) as (screen, found):
         page = screen.page
         await screen.press(texts.GO_ONLINE)
         await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
         await open_tool(screen, texts.ROBOT)
-        await looks.at("online", sizes)
+        await found.check("online", sizes)
 
 
-async def test_left_handed_controls(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
-    async with at_work(cell, project, browser, dark=True) as (screen, looks):
+async def test_left_handed_controls_have_no_layout_faults(
+    cell: Cell, project: Project, browser: Browser, sizes: list[str]
+) -> None:
+    async with project_on_tablet(cell, project, browser, dark=True) as (screen, found):
         page = screen.page
         await screen.press(texts.GO_ONLINE)
         await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
         await open_tool(screen, texts.ROBOT)
         await screen.press(texts.SETTINGS)
         await page.get_by_role("menuitem", name="Left-handed controls").click()
-        await looks.at("left hand", sizes)
+        await found.check("left hand", sizes)
         await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
         await screen.press(texts.LARGER_PANEL)
-        await looks.at("large panel", ("phone", "portrait"))
+        await found.check("large panel", ("phone", "portrait"))
         await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
         await page.get_by_role("button", name=texts.SMALLER_PANEL).click(trial=True)
         await page.get_by_role("button", name=texts.STOP_MOTION).click(trial=True)
@@ -203,7 +209,7 @@ async def test_left_handed_controls(cell: Cell, project: Project, browser: Brows
 
 async def test_reduced_motion_stops_animations(cell: Cell, project: Project, browser: Browser) -> None:
     async with screen_of(browser, cell.url, reduced_motion=True) as screen:
-        await at_the_project(screen, "Berta", project)
+        await join_and_open(screen, "Berta", project)
         await screen.press(texts.OBJECTS)
         # Spinners are exempt.
         running = """() => document.getAnimations()
@@ -211,13 +217,15 @@ async def test_reduced_motion_stops_animations(cell: Cell, project: Project, bro
         assert await screen.page.evaluate(running) == []
 
 
-async def test_lost_server(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
+async def test_screen_without_a_server_has_no_layout_faults(
+    cell: Cell, project: Project, browser: Browser, sizes: list[str]
+) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
         screen.expected_errors = SERVER_GONE
-        await at_the_project(screen, "Cecil", project)
+        await join_and_open(screen, "Cecil", project)
         await screen.page.wait_for_load_state("networkidle")  # all lazily loaded parts are loaded
         await cell.kill("server")
         await screen.sees(texts.NO_CONNECTION)
-        looks = ScreenFaults(screen)
-        await looks.at("lost server", sizes)
-        assert not looks.found, looks.report()
+        found = ScreenFaults(screen)
+        await found.check("lost server", sizes)
+        assert not found.faults, found.report()

@@ -11,7 +11,7 @@ from tests.editor.screen import screen_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
-OTHER = "20245500777"
+OTHER_SERIAL_NUMBER = "20245500777"
 
 
 async def go_online(client: Client) -> None:
@@ -27,7 +27,7 @@ async def test_a_replaced_device_is_confirmed_by_a_technician(cell: Cell, browse
     await client.call("StopScene")
     await scene_state(client, SceneStateEnum.STOPPED)
     try:
-        await cell.renew_robot("--serial-number", OTHER)
+        await cell.renew_robot("--serial-number", OTHER_SERIAL_NUMBER)
         await go_online(client)
         async with screen_of(browser, cell.url, touch=True) as screen:
             page = screen.page
@@ -35,7 +35,7 @@ async def test_a_replaced_device_is_confirmed_by_a_technician(cell: Cell, browse
             await page.get_by_role("button", name=texts.DEVICES).click()
             await screen.press("Open the device card")
             card = page.get_by_role("dialog")
-            await expect(card).to_contain_text(f"serial number {OTHER} instead of 20235500042")
+            await expect(card).to_contain_text(f"serial number {OTHER_SERIAL_NUMBER} instead of 20235500042")
             await screen.settle()
             assert await screen.faults() == []
             await screen.picture("device-card-different")
@@ -48,7 +48,7 @@ async def test_a_replaced_device_is_confirmed_by_a_technician(cell: Cell, browse
             await screen.press("Confirm this device")
             await screen.sees("is confirmed and executes commands again")
             (found,) = (each for each in (await client.call("ListDeviceCards")).devices if each.object_id == robot)
-            assert (found.identity.serial, found.confirmed_by) == (OTHER, "Eva")
+            assert (found.identity.serial, found.confirmed_by) == (OTHER_SERIAL_NUMBER, "Eva")
     finally:
         await cell.close_clients()
         await cell.renew_robot()

@@ -1,4 +1,4 @@
-"""Uploaded meshes and robots in the 3D view, and the reason for what cannot be shown."""
+"""Uploaded meshes and robots in the 3D view, and the reason why a model cannot be shown."""
 
 import io
 import zipfile
@@ -59,8 +59,8 @@ VISE_TRIANGLES = 13_856
 
 
 def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
-    made = mesh.export(file_type=kind)
-    return made if isinstance(made, bytes) else str(made).encode()
+    content = mesh.export(file_type=kind)
+    return content if isinstance(content, bytes) else str(content).encode()
 
 
 def vise() -> bytes:
@@ -85,13 +85,13 @@ def turner() -> bytes:
 
 
 @dataclass
-class Place:
+class MeshScene:
     cell: Cell
     ids: dict[str, str]
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
-async def place(module_cell: Cell) -> AsyncIterator[Place]:
+async def mesh_scene(module_cell: Cell) -> AsyncIterator[MeshScene]:
     """A scene of uploaded meshes and robots, of which two cannot be shown and one only in part."""
     cell = module_cell
     client = await cell.client("maker")
@@ -120,43 +120,43 @@ async def place(module_cell: Cell) -> AsyncIterator[Place]:
         pose = Pose(Position(0.45 * number - 0.9, 0.0, 0.1 if number < 3 else 0.0))
         await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs(kind.lower(), kind, pose))
         ids[kind] = (await client.next_event("SceneObjectChanged")).data.id
-    yield Place(cell, ids)
+    yield MeshScene(cell, ids)
 
 
-async def test_uploaded_meshes_are_shown(browser: Browser, place: Place) -> None:
-    async with screen_of(browser, place.cell.url, drawn=True) as screen:
+async def test_uploaded_meshes_are_shown(browser: Browser, mesh_scene: MeshScene) -> None:
+    async with screen_of(browser, mesh_scene.cell.url, drawn=True) as screen:
         # The browser's message for the two refused requests.
         screen.expected_errors = ("the server responded with a status of 400",)
         await screen.join("Eva")
         shown = "([id, count]) => window.__engine?.item(id)?.triangles === count"
-        await screen.until(shown, [place.ids["Vise"], VISE_TRIANGLES])
-        await screen.until(shown, [place.ids["Block"], 12])
+        await screen.until(shown, [mesh_scene.ids["Vise"], VISE_TRIANGLES])
+        await screen.until(shown, [mesh_scene.ids["Block"], 12])
         # A cylinder and a box; the third mesh is broken, the others are shown.
         turner_mesh = (
             "id => window.__engine.item(id).problem.includes('cover.stl') && window.__engine.item(id).triangles"
         )
-        assert await screen.until(turner_mesh, place.ids["Turner"]) == 4 * 48 + 12
-        assert (await screen.item(place.ids["Turner"]))["joints"] == {"turn": 0}
+        assert await screen.until(turner_mesh, mesh_scene.ids["Turner"]) == 4 * 48 + 12
+        assert (await screen.item(mesh_scene.ids["Turner"]))["joints"] == {"turn": 0}
         for name in ("Vise", "Block"):
-            item = await screen.item(place.ids[name])
+            item = await screen.item(mesh_scene.ids[name])
             assert (item["problem"], item["visible"]) == ("", True)
         await screen.settle()
         await screen.picture("meshes")
 
 
-async def test_broken_meshes_are_replaced_with_the_reason(browser: Browser, place: Place) -> None:
-    async with screen_of(browser, place.cell.url, drawn=True) as screen:
+async def test_broken_meshes_have_a_placeholder_and_the_reason(browser: Browser, mesh_scene: MeshScene) -> None:
+    async with screen_of(browser, mesh_scene.cell.url, drawn=True) as screen:
         screen.expected_errors = ("the server responded with a status of 400",)
         await screen.join("Eva")
         for name, words, badge in (
             ("Broken", "The mesh broken.stl has no triangles", "model cannot be shown"),
             ("Ruin", "ruin.zip is not a zip archive", "model cannot be shown"),
         ):
-            await screen.until("id => window.__engine?.item(id)?.problem", place.ids[name])
-            item = await screen.item(place.ids[name])
+            await screen.until("id => window.__engine?.item(id)?.problem", mesh_scene.ids[name])
+            item = await screen.item(mesh_scene.ids[name])
             assert words in item["problem"]
             assert item["badge"] == badge
-            assert item["triangles"] > 0, "something stands for it"
+            assert item["triangles"] > 0, "no placeholder is shown"
         # The screen shows the newest message; a tap on it lists all.
         newest = screen.page.get_by_role("region", name=texts.MESSAGE_BAR).get_by_role("alert")
         await newest.get_by_text("+2", exact=True).wait_for()

@@ -1,4 +1,4 @@
-"""Nodes: a user sees which computers can be used, and sets on which one a device runs."""
+"""Nodes: a user sees which computers can be used, and selects the one on which a device runs."""
 
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
@@ -39,7 +39,7 @@ def node(broker: Broker, tmp_path: Path) -> Iterator[Node]:
 async def served(
     broker: Broker, tmp_path: Path, built_editor: Path, monkeypatch: pytest.MonkeyPatch
 ) -> AsyncIterator[Cell]:
-    """A server of its own, with a broker and without devices."""
+    """A separate server with a broker and without devices."""
     monkeypatch.setenv("ARCOR2_HW_NATS_URL", broker.url)
     cell = Cell(tmp_path)
     await cell.start_server()
@@ -47,7 +47,9 @@ async def served(
     await cell.stop()
 
 
-async def test_a_device_is_set_on_a_node_that_is_lost(node: Node, served: Cell, browser: Browser) -> None:
+async def test_a_device_runs_on_a_selected_node_and_the_lost_node_is_shown(
+    node: Node, served: Cell, browser: Browser
+) -> None:
     client = await served.client("colleague")
     await client.call("NewScene", rpc.NewSceneArgs("workplace"))
     await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("clock", "TimeActions"))

@@ -25,7 +25,7 @@ from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
-BEGUN = 60_000
+START_TIMEOUT = 60_000
 """Time until a started program is shown, ms."""
 
 
@@ -34,13 +34,13 @@ async def colleague(cell: Cell) -> AsyncIterator[Client]:
     yield await cell.client("colleague")
 
 
-async def at_the_machine(screen: Screen, kiosk: bool = False, token: str = "") -> None:
+async def join_as_operator(screen: Screen, kiosk: bool = False, token: str = "") -> None:
     await screen.join("Olga", f"/?{token and f'token={token}&'}q=low#/operator{'?kiosk' if kiosk else ''}")
 
 
 @pytest.fixture
 def token(cell: Cell, colleague: Client) -> Iterator[str]:
-    """Return a token of the role operator. Clients that are connected already need none."""
+    """Return a token of the role operator. Connected clients do not need it."""
     tokens = TokenFile(cell.data_dir)
     secret = tokens.add("tablet", Role.OPERATOR)[1]
     yield secret
@@ -48,38 +48,40 @@ def token(cell: Cell, colleague: Client) -> Iterator[str]:
         tokens.revoke(each.id)
 
 
-async def with_message(client: Client, scene: Scene, project: Project, method: str, text: str) -> None:
+async def start_with_message(client: Client, scene: Scene, project: Project, method: str, text: str) -> None:
     """Let the open project start with a message or an alarm."""
     flow = next(each.id for each in scene.objects if each.type == "FlowActions")
     first = next(each for each in project.logic if each.start == START)
     point, parameters = project.action_points[0].id, [ActionParameter("text", "string", json.dumps(text))]
     if method == "raise_alarm":
         parameters.append(ActionParameter("level", "string_enum", '"error"'))
-    await client.call("AddAction", rpc.AddActionArgs(point, "say", f"{flow}/{method}", parameters, [Flow()]))
+    await client.call("AddAction", rpc.AddActionArgs(point, "message", f"{flow}/{method}", parameters, [Flow()]))
     await client.call("SaveProject")
     points = (await client.get_project(project.id)).action_points
-    say = next(action.id for each in points for action in each.actions if action.name == "say")
-    await client.call("UpdateLogicItem", rpc.UpdateLogicItemArgs(first.id, START, say))
-    await client.call("AddLogicItem", rpc.AddLogicItemArgs(say, first.end))
+    message = next(action.id for each in points for action in each.actions if action.name == "message")
+    await client.call("UpdateLogicItem", rpc.UpdateLogicItemArgs(first.id, START, message))
+    await client.call("AddLogicItem", rpc.AddLogicItemArgs(message, first.end))
     await client.call("SaveProject")
 
 
-async def built(cell: Cell, colleague: Client, message: str = "", method: str = "show_message") -> PackageSummary:
+async def build_package(
+    cell: Cell, colleague: Client, message: str = "", method: str = "show_message"
+) -> PackageSummary:
     """Build the package of the project and close the project."""
     scene, project = await cell.open(colleague)
     if message:
-        await with_message(colleague, scene, project, method, message)
+        await start_with_message(colleague, scene, project, method, message)
     package_id = await cell.build(colleague, project)
     return next(each for each in await colleague.list_packages() if each.id == package_id)
 
 
-async def reads_who_commands(screen: Screen, technician: Client, sizes: Iterable[str]) -> None:
-    """Open the dialog from the note on the screen. An operator can only read it; it shows changes by a technician."""
+async def check_authority_dialog(screen: Screen, technician: Client, sizes: Iterable[str]) -> None:
+    """Open the dialog from the note on the screen. An operator can only read it. It shows changes by a technician."""
     start = screen.page.get_by_role("button", name=re.compile("^Start"))
     await technician.call("SetCellAuthority", rpc.SetCellAuthorityArgs(CellAuthority.NOBODY))
     await expect(start).to_have_attribute("aria-disabled", "true")
     await screen.sees("No program starts until a technician gives the authority")
-    await pictures(screen, "operator, nobody commands", sizes)
+    await check_layout(screen, "operator, nobody commands", sizes)
     await screen.press("Nobody commands this cell.")
     dialog = screen.page.get_by_role("dialog", name="Mode and authority")
     hub = dialog.get_by_role("button", name=re.compile("^This server"))
@@ -93,63 +95,63 @@ async def reads_who_commands(screen: Screen, technician: Client, sizes: Iterable
     await expect(start).not_to_have_attribute("aria-disabled", "true")
 
 
-async def test_built_package_appears_runs_and_its_error_is_shown(
+async def test_package_appears_runs_and_its_error_is_shown(
     cell: Cell, colleague: Client, browser: Browser, token: str, sizes: list[str]
 ) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
         page = screen.page
-        await at_the_machine(screen, kiosk=True, token=token)
+        await join_as_operator(screen, kiosk=True, token=token)
         await screen.sees("No packages yet.")
         assert await page.get_by_role("button", name="Open the editor").count() == 0
         # A package built by another user appears by itself.
         _, project = await cell.open(colleague)
         await cell.build(colleague, project)
         await page.get_by_role("radio", name=project.name).wait_for()
-        await reads_who_commands(screen, colleague, sizes)
+        await check_authority_dialog(screen, colleague, sizes)
         await screen.press("Start")
-        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=BEGUN)
+        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=START_TIMEOUT)
         # Without a board, the reader finds no code. The operator enters it.
         card = page.get_by_role("region", name="The program is held")
-        await expect(card).to_contain_text("Held at scan", timeout=BEGUN)
+        await expect(card).to_contain_text("Held at scan", timeout=START_TIMEOUT)
         await expect(card).to_contain_text("no code was read")
         state = page.get_by_role("status", name="State")
         await expect(state).to_have_count(0)
         await expect(page.get_by_role("button", name=texts.RESUME)).to_have_count(0)
-        await pictures(screen, "held", sizes)
+        await check_layout(screen, "held", sizes)
         await card.get_by_role("button", name="Enter the result").click()
         code = card.get_by_label("code")
         await code.fill("B-1")
-        await pictures(screen, "held, result", sizes)
+        await check_layout(screen, "held, result", sizes)
         await screen.press("Continue with this result")
         # Nothing can be picked in this cell. The retry asks first and fails again; then the operator ends the program.
         for _ in ("pick", "pick again"):
-            await expect(card).to_contain_text("Held at pick", timeout=BEGUN)
+            await expect(card).to_contain_text("Held at pick", timeout=START_TIMEOUT)
             await card.evaluate("card => { card.dataset.decided = ''; }")
             await card.get_by_role("button", name="Try again").click()
             asked = page.get_by_role("alertdialog", name="Try pick again?")
             await expect(asked).to_contain_text("It may have been executed partly.")
             await asked.get_by_role("button", name="Try again").click()
-            await expect(page.locator("[data-decided]")).to_have_count(0)  # the next card is another one
-        await expect(card).to_contain_text("Held at pick", timeout=BEGUN)
+            await expect(page.locator("[data-decided]")).to_have_count(0)  # the next fault has a new card
+        await expect(card).to_contain_text("Held at pick", timeout=START_TIMEOUT)
         # The robot goes into a protective stop, which the operator acknowledges in the card.
         await cell.command_fake("robot", "protective_stop")
-        recognised = card.get_by_role("button", name="Acknowledge")
+        acknowledge = card.get_by_role("button", name="Acknowledge")
         await expect(card).to_contain_text("Find out why the arm was stopped, then acknowledge the protective stop.")
-        await pictures(screen, "held, protective stop", sizes, scrolled="phone")
-        while await recognised.count():  # the controller refuses for 5 s
+        await check_layout(screen, "held, protective stop", sizes, scrolled="phone")
+        while await acknowledge.count():  # the controller refuses for 5 s
             with contextlib.suppress(Error):  # the button is replaced meanwhile
-                await recognised.click(timeout=2000)
+                await acknowledge.click(timeout=2000)
             await screen.settle()
         assert (await cell.command_fake("robot", "truth"))["safety"] == "NORMAL"
         await screen.press("End the program")
         await expect(state).to_contain_text("Run failed in pick")
         await expect(card).to_have_count(0)
         assert [each.end.value for each in (await colleague.call("ListRuns")).runs] == ["failed"]
-        await pictures(screen, "operator", sizes)
+        await check_layout(screen, "operator", sizes)
 
 
-async def pictures(screen: Screen, name: str, sizes: Iterable[str], scrolled: str = "") -> None:
-    """Check the layout in these sizes, and take pictures. In the size `scrolled`, the page is longer."""
+async def check_layout(screen: Screen, name: str, sizes: Iterable[str], scrolled: str = "") -> None:
+    """Check the layout in these sizes, and take pictures. In the size `scrolled`, faults are allowed."""
     for device in sizes:
         await screen.page.set_viewport_size(VIEWPORTS[device])  # type: ignore[arg-type]
         await screen.settle()
@@ -161,12 +163,12 @@ async def pictures(screen: Screen, name: str, sizes: Iterable[str], scrolled: st
 async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
     cell: Cell, colleague: Client, browser: Browser
 ) -> None:
-    package = await built(cell, colleague)
+    package = await build_package(cell, colleague)
     async with screen_of(browser, cell.url) as watcher, screen_of(browser, cell.url) as operator:
         # A user of the editor watches a run of another user until the server shows the lists again.
         await watcher.join("Wendy")
         await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
-        await watcher.page.get_by_text("before more_boards").wait_for(timeout=BEGUN)
+        await watcher.page.get_by_text("before more_boards").wait_for(timeout=START_TIMEOUT)
         await colleague.call("ResumePackage")
         await watcher.page.get_by_role("heading", name=texts.HOME_HEADING).wait_for()
         banner = watcher.page.get_by_role("alert").filter(has_text="Run failed in scan")
@@ -177,7 +179,7 @@ async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
 
         # An operator who comes later does not see "Ready" either, nor after a reload, until they dismiss the result.
         state = operator.page.get_by_role("status", name="State")
-        await at_the_machine(operator)
+        await join_as_operator(operator)
         for _ in ("first", "reloaded"):
             await expect(state).to_contain_text("Run failed in scan")
             await expect(state).not_to_contain_text("Ready")
@@ -193,7 +195,7 @@ async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
             await expect(state).to_contain_text("failed")
             await operator.page.reload()
 
-        # Each user dismisses it for themselves. The open project keeps the result of its last run.
+        # Each user dismisses it for themselves. The open project still shows the result of its last run.
         await expect(banner).to_be_visible()
         await colleague.call("OpenProject", rpc.IdArgs((await colleague.call("ListProjects"))[0].id))
         await watcher.page.get_by_role("navigation").get_by_role("button", name=texts.RUN, exact=True).click()
@@ -209,28 +211,30 @@ async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
         await colleague.call("CloseProject")
 
 
-async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Browser) -> None:
-    package = await built(cell, colleague, "Refill the labels.")
+async def test_operator_steps_and_stops_a_run_that_another_user_started_paused(
+    cell: Cell, colleague: Client, browser: Browser
+) -> None:
+    package = await build_package(cell, colleague, "Refill the labels.")
     async with screen_of(browser, cell.url) as screen:
         page = screen.page
-        await at_the_machine(screen)
+        await join_as_operator(screen)
         # A run that another user has started paused can be stepped and stopped from here.
         await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
-        await page.get_by_text("before say").wait_for(timeout=BEGUN)
+        await page.get_by_text("before message").wait_for(timeout=START_TIMEOUT)
         await screen.press(texts.STEP)
         await page.get_by_text("before more_boards").wait_for()
         await page.get_by_text("Refill the labels.").wait_for()
         await screen.picture("operator message")
         await screen.press(texts.STEP)
         await page.get_by_text("before scan").wait_for()
-        # The step in words, with the cell and the numbers of this run.
+        # The next action is described in words, next to a view of the cell and the counts of this run.
         state = page.get_by_role("status", name="State")
         await expect(state).to_contain_text("reader: Read the code in front of the reader")
         await expect(state).to_contain_text("Press Resume to continue, or Step for one action.")
         numbers = page.get_by_role("region", name="This run")
         await expect(numbers).to_contain_text("Good0Bad0Cycles0")
         shown = await screen.until("window.__engine?.ids().length > 0 && __engine.ids()")
-        assert all(each.startswith("obj_") for each in shown), "devices without points and actions"
+        assert all(each.startswith("obj_") for each in shown), "the view shows only objects"
         for name in ("tablet", "ipad", "phone"):
             await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
             await screen.settle()
@@ -248,17 +252,17 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
         await page.get_by_role("heading", name=texts.HOME_HEADING).wait_for()
 
 
-async def recording_is_shown(screen: Screen, alarms: Locator, sizes: Iterable[str]) -> None:
+async def check_recording(screen: Screen, alarms: Locator, sizes: Iterable[str]) -> None:
     """Open the recording of an alarm, read values, and zoom."""
     page = screen.page
     await alarms.get_by_role("button", name="Recording").first.click()
     window = page.get_by_role("dialog", name="Recording of")
     await expect(window).to_contain_text("The box for bad parts is full.")
     actions = window.get_by_role("region", name="Actions")
-    band = actions.get_by_title("say", exact=True)
+    band = actions.get_by_title("message", exact=True)
     await expect(band).to_have_count(1)
     await window.get_by_role("slider", name="Values at").press("ArrowLeft")
-    await expect(window).to_contain_text(re.compile(r"−0\.0[12]\ss"))  # at the value before
+    await expect(window).to_contain_text(re.compile(r"−0\.0[12]\ss"))  # at the previous value
     everything = await band.get_attribute("style")
     assert everything is not None
     await window.get_by_role("button", name="Zoom in").click()
@@ -281,12 +285,12 @@ async def test_alarm_is_acknowledged_during_a_run(
     cell: Cell, colleague: Client, browser: Browser, token: str, sizes: list[str]
 ) -> None:
     text = "The box for bad parts is full."
-    package = await built(cell, colleague, text, "raise_alarm")
+    package = await build_package(cell, colleague, text, "raise_alarm")
     async with screen_of(browser, cell.url, touch=True) as screen:
         page = screen.page
-        await at_the_machine(screen, kiosk=True, token=token)
+        await join_as_operator(screen, kiosk=True, token=token)
         await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
-        await page.get_by_text("before say").wait_for(timeout=BEGUN)
+        await page.get_by_text("before message").wait_for(timeout=START_TIMEOUT)
         await screen.press(texts.STEP)
         card = page.get_by_role("region", name="Alarm", exact=True)
         await expect(card.get_by_role("heading", name=text)).to_be_visible()
@@ -316,7 +320,7 @@ async def test_alarm_is_acknowledged_during_a_run(
         await screen.press("All alarms")
         await everything.get_by_role("radio", name="History").check(force=True)
         await expect(everything).to_contain_text("acknowledged by Olga")
-        await recording_is_shown(screen, everything, sizes)
+        await check_recording(screen, everything, sizes)
         await everything.get_by_role("radio", name="Statistics").check(force=True)
         await expect(everything).to_contain_text("Most frequent in 7 days")
     # A technician finds the same list in the workplace.
@@ -339,18 +343,18 @@ async def test_operator_takes_over_a_project_left_open_and_locked(
     cell: Cell, colleague: Client, browser: Browser, sizes: list[str]
 ) -> None:
     await colleague.update_presence(view="test")  # shows no project
-    await built(cell, colleague)
+    await build_package(cell, colleague)
     async with screen_of(browser, cell.url, touch=True) as screen:
         page = screen.page
-        await at_the_machine(screen)
+        await join_as_operator(screen)
         async with Client(cell.url, "Wendy", reconnect=False) as wendy:
             _, project = await cell.open(wendy)
             point = project.action_points[0]
             await wendy.call("AddActionPoint", rpc.AddActionPointArgs("unsaved", Position()))
             await wendy.call("WriteLock", rpc.WriteLockArgs(point.id))
             start = page.get_by_role("button", name="Start")
-            why = re.compile(rf"not available: {project.name} is open in the editor \(Wendy\)")
-            await expect(start).to_have_accessible_name(why)
+            reason = re.compile(rf"not available: {project.name} is open in the editor \(Wendy\)")
+            await expect(start).to_have_accessible_name(reason)
         await screen.sees(f"{project.name} is open in the editor. It is closed during the run")
         gone = page.get_by_role("button", name="Wendy left and still holds locks")
         await gone.wait_for()
@@ -373,7 +377,7 @@ async def test_operator_takes_over_a_project_left_open_and_locked(
         await screen.sees(f"You took over from Wendy: {point.name}.")
         await expect(gone).to_have_count(0)
         await screen.press("Start")
-        await page.get_by_role("button", name=texts.STOP, exact=True).click(timeout=BEGUN)
+        await page.get_by_role("button", name=texts.STOP, exact=True).click(timeout=START_TIMEOUT)
         await screen.sees(f"{project.name} is open in the editor. It is closed during the run")
         async with Client(cell.url, "Wendy", reconnect=False) as wendy:
             opened = (await wendy.next_event("OpenProject")).data.project

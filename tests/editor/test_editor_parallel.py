@@ -1,4 +1,4 @@
-"""Parallel work: two calls run at once, shown as one node with its branches, and stepped branch by branch."""
+"""Parallel calls: two calls run at once, shown as one node with branches, and stepped branch by branch."""
 
 import re
 from collections.abc import AsyncIterator
@@ -11,16 +11,16 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.package import PackageStateEnum
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
-from tests.editor.programming import Work, at_work
+from tests.editor.programming import Work, project_on_screen
 from tests.editor.screen import VIEWPORTS
-from tests.editor.test_editor_functions import BEGUN, _without_scan
+from tests.editor.test_editor_functions import START_TIMEOUT, _skip_scan
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def opened(module_cell: Cell, browser: Browser) -> AsyncIterator[Work]:
-    async with at_work(module_cell, browser) as open_project:
+    async with project_on_screen(module_cell, browser) as open_project:
         yield open_project
 
 
@@ -28,13 +28,13 @@ async def opened(module_cell: Cell, browser: Browser) -> AsyncIterator[Work]:
 async def work(opened: Work) -> Work:
     """The project is open and offline; open, pick and insert are calls of functions."""
     await opened.start()
-    await _without_scan(opened)
+    await _skip_scan(opened)
     for name, action in (("open_lid", "open"), ("fetch", "pick"), ("put_in", "insert")):
         await opened.client.call("MakeFunction", rpc.MakeFunctionArgs(name, [opened.action(action).id]))
     return opened
 
 
-async def test_calls_run_at_once_and_are_followed_branch_by_branch(work: Work) -> None:
+async def test_parallel_calls_are_shown_and_stepped_branch_by_branch(work: Work) -> None:
     screen, page, panel = work.screen, work.screen.page, work.panel
     await work.mode("Flow")
     graph = page.get_by_role("region", name=texts.GRAPH)
@@ -42,11 +42,11 @@ async def test_calls_run_at_once_and_are_followed_branch_by_branch(work: Work) -
     def node(name: str) -> str:
         return f'.react-flow__node:is([aria-label^="{name},"], [aria-label="{name}"])'
 
-    async def whole() -> None:
+    async def show_whole_program() -> None:
         await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
         await screen.settle()
 
-    # Calls of the same device are refused where they are selected.
+    # Calls that use the same device are refused at the selection.
     await graph.locator(node("put_in")).wait_for()
     await graph.get_by_role("button", name=texts.SELECT_SEVERAL).click()
     await graph.locator(node("fetch")).click()
@@ -72,7 +72,7 @@ async def test_calls_run_at_once_and_are_followed_branch_by_branch(work: Work) -
     await expect(graph.locator(node("fetch"))).to_have_count(0)
     branches = panel.get_by_role("region", name="Branches")
     await expect(branches.get_by_role("listitem")).to_have_count(2)
-    await whole()
+    await show_whole_program()
     await screen.picture("parallel node")
     assert await screen.faults() == []
     stored = await work.saved()
@@ -117,7 +117,7 @@ async def test_calls_run_at_once_and_are_followed_branch_by_branch(work: Work) -
     await graph.locator(node("open")).click()
     await work.tap_button("Run to here", panel)
     lanes = page.get_by_role("list", name="Branches")
-    await expect(lanes.get_by_role("listitem", name="open_lid")).to_contain_text("before open", timeout=BEGUN)
+    await expect(lanes.get_by_role("listitem", name="open_lid")).to_contain_text("before open", timeout=START_TIMEOUT)
     await expect(lanes.get_by_role("listitem", name="fetch")).to_contain_text(re.compile("waiting|before pick"))
     await work.next_event("PackageState", lambda event: event.data.state is PackageStateEnum.PAUSED)
     await page.get_by_role("navigation", name="Open function").get_by_role("button", name="Back").click()
@@ -126,7 +126,7 @@ async def test_calls_run_at_once_and_are_followed_branch_by_branch(work: Work) -
     await screen.picture("parallel paused")
     assert await screen.faults() == []
     await lanes.get_by_role("button", name="Step open_lid").click()
-    await expect(lanes.get_by_role("listitem")).to_have_count(1, timeout=BEGUN)
+    await expect(lanes.get_by_role("listitem")).to_have_count(1, timeout=START_TIMEOUT)
     await expect(lanes.get_by_role("listitem", name="fetch")).to_contain_text(re.compile("waiting|before pick"))
     bar = page.get_by_role("group", name=texts.PROGRAM_STATE)
     await bar.get_by_role("button", name=texts.STOP).click()
@@ -135,7 +135,7 @@ async def test_calls_run_at_once_and_are_followed_branch_by_branch(work: Work) -
         return await bar.count() == 0
 
     await until(stopped, "the program has stopped")
-    # One after the other again.
+    # Make the calls run one after the other again.
     await both.locator(".flow-title").first.click()
     await panel.get_by_role("button", name="Run one after the other").click()
     await graph.locator(node("fetch")).wait_for()

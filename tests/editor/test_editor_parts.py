@@ -21,11 +21,13 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 def hang(folder: Path, hangs: bool) -> None:
-    """Let the gripper of the package hang while it picks."""
+    """Set whether the gripper of the package hangs while it picks."""
     (folder / "hang").touch() if hangs else (folder / "hang").unlink()
 
 
-async def test_operator_confirms_a_part_and_continues_after_kill(tmp_path: Path, browser: Browser) -> None:
+async def test_operator_confirms_a_part_and_continues_after_the_host_was_killed(
+    tmp_path: Path, browser: Browser
+) -> None:
     notes = tmp_path / "notes"
     hang(tmp_path, True)
     write_package(tmp_path / "data" / "packages" / "pkg_1", tmp_path, ONE)
@@ -62,7 +64,7 @@ async def test_operator_confirms_a_part_and_continues_after_kill(tmp_path: Path,
                 await expect(held.get_by_role("button", name="Correct A-1")).to_be_visible()
                 assert await screen.faults() == []
                 await screen.picture("parts, held")
-                assert notes.read_text().split() == ["pick"]  # nothing has moved
+                assert notes.read_text().split() == ["pick"]  # the gripper has not moved since
                 await held.get_by_role("button", name="Done by hand, continue").click()
                 await expect(held).to_have_count(0)
                 await expect(parts).to_have_count(0)

@@ -1,4 +1,4 @@
-"""Persons at a shared device: the first administrator, PIN and card, log-off, and Stop without a person."""
+"""Persons at a shared device: the first administrator, PIN and card, log-off, and Stop motion without a log-on."""
 
 import asyncio
 import time
@@ -64,7 +64,7 @@ async def test_persons_share_a_tablet(tmp_path: Path, built_editor: Path, browse
         await field.fill("Ivo")
         await screen.press("Read card")
         await field.focus()
-        await read_card(screen)  # the field does not get it
+        await read_card(screen)  # the focused field does not receive the digits
         await screen.sees("A card was read.")
         await expect(field).to_have_value("Ivo")
         assert await screen.faults() == []
@@ -86,12 +86,12 @@ async def test_persons_share_a_tablet(tmp_path: Path, built_editor: Path, browse
         assert await screen.faults() == []
         await read_card(screen)
         await expect(page.get_by_role("button", name="Log off Ivo")).to_be_visible()
-        await screen.sees("Operator")  # the screen of his role
+        await screen.sees("Operator")  # the screen of the role operator
         await screen.picture("persons-operator")
         await screen.press("Log off Ivo")
         await enter_pin(screen, "Eva", PIN)
         await expect(logged_on).to_be_visible()
-        await read_card(screen)  # the next person takes over
+        await read_card(screen)  # a card logs on the next person
         await expect(page.get_by_role("button", name="Log off Ivo")).to_be_visible()
     entries = [(entry.request, entry.user, entry.outcome.value) for entry in AuditFile(data / "audit.sqlite").all()]
     assert ("StopAll", "tablet", "done") in entries

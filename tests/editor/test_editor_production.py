@@ -37,7 +37,7 @@ async def open_production(page: Page, screen: Screen) -> None:
     await page.get_by_role("menuitem", name="Recipes and units").click()
 
 
-async def checked(screen: Screen, name: str) -> None:
+async def check_page(screen: Screen, name: str) -> None:
     """Check that a page fits, and take a picture."""
     await screen.settle()
     await screen.picture(name)
@@ -45,7 +45,9 @@ async def checked(screen: Screen, name: str) -> None:
     assert await screen.barriers() == []
 
 
-async def test_a_product_is_released_produced_and_found(tmp_path: Path, built_editor: Path, browser: Browser) -> None:
+async def test_a_recipe_is_released_and_the_unit_it_produces_is_found(
+    tmp_path: Path, built_editor: Path, browser: Browser
+) -> None:
     data = tmp_path / "data"
     constant = ProjectParameter("serial", "string", '"A-1"', id="prm_serial")
     project = replace(PROJECT, parameters=[constant, ProjectParameter("labels", "integer", "2", id="prm_labels")])
@@ -70,18 +72,18 @@ async def test_a_product_is_released_produced_and_found(tmp_path: Path, built_ed
         await page.get_by_label("serial, This recipe").fill("B-7")
         for field, text in (("This recipe", "3"), ("Lowest", "1"), ("Highest", "4")):
             await page.get_by_label(f"labels, {field}").fill(text)
-        await checked(screen, "recipe-form")
+        await check_page(screen, "recipe-form")
         await screen.press("Save")
         await screen.press("Sign as tested")
-        await checked(screen, "recipe-sign")
+        await check_page(screen, "recipe-sign")
         await screen.press("Cancel")
         await sign(page, screen, "Sign as tested")
         await sign(page, screen, "Release")
-        await checked(screen, "recipes")
+        await check_page(screen, "recipes")
         await screen.press("Change over")
         await expect(page.get_by_role("row", name="serial")).to_contain_text('"B-7"')
         await screen.sees("The packages have the same content.")
-        await checked(screen, "recipe-comparison")
+        await check_page(screen, "recipe-comparison")
         await screen.press("Change over")
         await expect(page.get_by_role("status").filter(has_text="In production")).to_contain_text("Board, revision 2")
         await screen.press("Roll back to Board, revision 1")  # the first tap
@@ -100,7 +102,7 @@ async def test_a_product_is_released_produced_and_found(tmp_path: Path, built_ed
         await labels.fill("4")
         for size in VIEWPORTS.values():
             await page.set_viewport_size(size)  # type: ignore[arg-type]
-            await checked(screen, f"operator-product {size['width']}")
+            await check_page(screen, f"operator-product {size['width']}")
         await screen.press("Start")
         await screen.sees("Finished")
         (run,) = (await client.call("ListRuns")).runs
@@ -110,8 +112,8 @@ async def test_a_product_is_released_produced_and_found(tmp_path: Path, built_ed
         await page.get_by_placeholder("Serial number").fill("b-7")
         row = page.get_by_role("listitem").filter(has_text="B-7")
         await expect(row).to_contain_text("Good")
-        await checked(screen, "units")
+        await check_page(screen, "units")
         await row.get_by_role("button").click()
         await screen.sees("O-17")
         await screen.sees("into_box")
-        await checked(screen, "unit-record")
+        await check_page(screen, "unit-record")

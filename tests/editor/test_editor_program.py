@@ -18,7 +18,7 @@ from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.project import ActionParameter, Flow, FlowTypes
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
-from tests.editor.programming import Work, at_work
+from tests.editor.programming import Work, project_on_screen
 from tests.editor.screen import VIEWPORTS
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def opened(module_cell: Cell, browser: Browser) -> AsyncIterator[Work]:
     """One project for all tests of this module. Each test adds the actions it edits."""
-    async with at_work(module_cell, browser, ("counter", "CounterActions")) as open_project:
+    async with project_on_screen(module_cell, browser, ("counter", "CounterActions")) as open_project:
         yield open_project
 
 
@@ -46,8 +46,8 @@ def reference(parameter: Any) -> str:
     return str(msgspec.json.decode(parameter.value))
 
 
-async def test_action_at_the_crosshair_takes_two_taps(work: Work) -> None:
-    """Adds the point, its orientation and the action."""
+async def test_action_at_the_crosshair_takes_at_most_three_taps(work: Work) -> None:
+    """The taps add the point, its orientation and the action."""
     screen = work.screen
     work.taps = 0
     await work.tool(texts.PROGRAM)
@@ -60,7 +60,7 @@ async def test_action_at_the_crosshair_takes_two_taps(work: Work) -> None:
             return hit && [hit.point, hit.normal].map(({ x, y, z }) => [x, y, z]);
         }"""
     )
-    assert aimed, "the view shows a body in its middle"
+    assert aimed, "no body is in the middle of the view"
     place, normal = aimed
     await work.tap_button("move Move the TCP to a pose.")
     assert work.taps <= 3
@@ -73,10 +73,10 @@ async def test_action_at_the_crosshair_takes_two_taps(work: Work) -> None:
     axis = (2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y))
     assert math.dist(axis, [-each for each in normal]) < 1e-3
     assert action.type == f"{work.object('robot')}/move"
-    given = await work.parameters(action.id)
-    assert reference(given["pose"]) == orientation.id
-    assert given["speed"].value == "0.25", "what has a default gets it"
-    # It is shown and selected; the panel stays open for the next action.
+    parameters = await work.parameters(action.id)
+    assert reference(parameters["pose"]) == orientation.id
+    assert parameters["speed"].value == "0.25", "the default is not set"
+    # The action is shown and selected; the panel stays open for the next action.
     await work.tap_button("Set parameters")
     assert (await screen.item(action.id))["kind"] == "action"
     await work.panel.get_by_role("heading", name=action.name, exact=True).wait_for()
@@ -95,7 +95,7 @@ async def test_values_are_validated_by_field_and_server(work: Work) -> None:
     await field.press("Enter")
     await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     assert (await work.parameters(action))["number"] == number(3)
-    # Locked by another user: refused at the field, and the typed text stays.
+    # If another user holds the lock, the field shows the refusal and the typed text stays.
     await work.client.call("WriteLock", rpc.WriteLockArgs(action))
     await field.fill("4")
     await field.press("Enter")
@@ -104,19 +104,19 @@ async def test_values_are_validated_by_field_and_server(work: Work) -> None:
     await field.press("Escape")
     await expect(field).to_have_value("3")
     await work.client.call("WriteUnlock", rpc.WriteUnlockArgs(action))
-    # It becomes a new project parameter.
+    # The value becomes a new project parameter.
     await work.panel.get_by_role("radiogroup", name="Source of number").get_by_text("Project").click()
     await field.select_option(label="New variable…")
-    made = (await work.next_event("ProjectParameterChanged")).data
-    assert (made.name, made.type, made.value) == ("number", "integer", "3")
+    created = (await work.next_event("ProjectParameterChanged")).data
+    assert (created.name, created.type, created.value) == ("number", "integer", "3")
     await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     linked = (await work.parameters(action))["number"]
-    assert (linked.type, reference(linked)) == ("project_parameter", made.id)
+    assert (linked.type, reference(linked)) == ("project_parameter", created.id)
     await work.tool(texts.PROGRAM)
     await work.mode(texts.VARIABLES)
     constant = work.panel.get_by_role("region", name="number")
     await constant.get_by_role("button", name="probe", exact=True).wait_for()
-    # A parameter in use cannot be removed; the message names its user.
+    # A parameter in use cannot be removed; the message names the action that uses it.
     await constant.get_by_role("button", name="Remove number").click(force=True)
     await work.screen.sees("Used by probe.")
 
@@ -137,8 +137,8 @@ async def test_only_results_of_earlier_actions_can_be_used(work: Work) -> None:
     assert (linked.type, reference(linked)) == ("link", f"{first}/default/0")
 
 
-async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
-    """In the graph. A changed step keeps its id."""
+async def test_branch_takes_at_most_five_taps_and_a_step_two(work: Work) -> None:
+    """Count the taps in the graph. A changed step keeps its id."""
     screen, page = work.screen, work.screen.page
     check = await work.add("check_input", "robot/get_digital_input", "good", "there", number=number(1))
     yes = await work.add("on_yes", "flow/wait", "good")
@@ -196,10 +196,10 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
 
 
 async def test_error_exit_is_added_in_the_graph_and_its_error_used(work: Work) -> None:
-    """By two taps; it is for any error until its kinds are chosen."""
+    """Two taps add the exit. It handles every error until the user selects kinds of errors."""
     screen, page = work.screen, work.screen.page
     grab = await work.add("grab", "robot/get_digital_input", "good", number=number(1))
-    tell = await work.add("tell", "flow/show_message", "bad", text=ActionParameter("text", "string", '""'))
+    notify = await work.add("notify", "flow/show_message", "bad", text=ActionParameter("text", "string", '""'))
     await screen.close_panels()
     await work.mode("Flow")
     graph = page.get_by_role("region", name=texts.GRAPH)
@@ -208,33 +208,33 @@ async def test_error_exit_is_added_in_the_graph_and_its_error_used(work: Work) -
     work.taps = 0
     await work.tap_button("grab: On error", graph)
     await page.get_by_role("status").filter(has_text="Tap the step that follows if grab fails").wait_for()
-    await graph.locator('.react-flow__node[aria-label^="tell,"] .flow-name').click()
+    await graph.locator('.react-flow__node[aria-label^="notify,"] .flow-name').click()
     exit_ = (await work.next_event("LogicItemChanged")).data
-    assert (exit_.start, exit_.end, exit_.error_kinds) == (grab, tell, ["error"])
+    assert (exit_.start, exit_.end, exit_.error_kinds) == (grab, notify, ["error"])
     await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     await work.panel.get_by_label("Name of the error").wait_for()
     await page.get_by_role("button", name=re.compile("^Undo")).click()
-    gone = await work.next_event("LogicItemChanged")
-    assert (gone.change_type, gone.data.id) == (ChangeType.REMOVE, exit_.id)
+    removed = await work.next_event("LogicItemChanged")
+    assert (removed.change_type, removed.data.id) == (ChangeType.REMOVE, exit_.id)
     await page.get_by_role("button", name=re.compile("^Redo")).click()
     await work.next_event("LogicItemChanged")
     named = next(each for point in (await work.saved()).action_points for each in point.actions if each.id == grab)
     assert named.error_output == "get_digital_input_error"
     await graph.locator('.react-flow__node[aria-label^="grab,"] .flow-name').click()
     await work.panel.locator(".next-step", has_text="on error").click()
-    # Its kinds are chosen in plain words, and the edge names them.
+    # The user selects kinds of errors by name, and the edge shows their number.
     for kind in ("Refused", "Not done in time"):
         await work.panel.locator(".kinds .chip", has_text=kind).click()
         changed = (await work.next_event("LogicItemChanged")).data
     assert changed.error_kinds == ["refused", "device_timeout"]
     await graph.get_by_text("on error: 2 kinds").wait_for()
     await screen.picture("program error exit")
-    # Parts of the error are offered where the action has failed.
-    await graph.locator('.react-flow__node[aria-label^="tell,"] .flow-name').click()
+    # Fields of the error are offered to the actions on the error path.
+    await graph.locator('.react-flow__node[aria-label^="notify,"] .flow-name').click()
     await work.panel.get_by_role("radiogroup", name="Source of text").get_by_text("Result").click()
     await work.panel.get_by_label("text", exact=True).select_option(label="text of the error of grab")
     await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
-    assert reference((await work.parameters(tell))["text"]) == f"{grab}/error/2"
+    assert reference((await work.parameters(notify))["text"]) == f"{grab}/error/2"
     assert await screen.faults() == []
     await work.mode("3D")
     assert (await screen.item(exit_.id))["kind"] == "logic"
@@ -258,26 +258,26 @@ async def test_action_is_moved_in_the_list_and_back_by_one_undo(work: Work) -> N
     await work.mode("Actions")
     await work.tap_button("Move three")
     await work.tap_button("Move three up")
-    await until(lambda: _is(order(), [first, third, second]), "the action is moved", 20)
+    await until(lambda: _equals(order(), [first, third, second]), "the action is moved", 20)
     await work.screen.picture("program list")
     assert await work.screen.faults() == []
     await page.get_by_role("button", name=re.compile("^Undo")).click()
-    await until(lambda: _is(order(), [first, second, third]), "the move is undone", 20)
+    await until(lambda: _equals(order(), [first, second, third]), "the move is undone", 20)
 
 
-async def _is(found: Awaitable[list[str]], wanted: list[str]) -> bool:
+async def _equals(found: Awaitable[list[str]], wanted: list[str]) -> bool:
     return await found == wanted
 
 
-async def at_rest(shown: Locator) -> None:
+async def wait_until_still(shown: Locator) -> None:
     """Wait until an element has not moved for longer than the graph takes to move to another view."""
 
-    async def rests() -> bool:
+    async def is_still() -> bool:
         before = await shown.bounding_box()
         await asyncio.sleep(0.3)
         return await shown.bounding_box() == before
 
-    await until(rests, "the graph is at rest")
+    await until(is_still, "the graph has stopped moving")
 
 
 async def test_graph_does_not_move_under_a_tap(work: Work) -> None:
@@ -288,15 +288,15 @@ async def test_graph_does_not_move_under_a_tap(work: Work) -> None:
     await work.mode("Flow")
     graph = page.get_by_role("region", name=texts.GRAPH)
     await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
-    way = graph.get_by_role("button", name="surely: yes", exact=True)
-    await at_rest(way)
-    await way.hover()
+    output = graph.get_by_role("button", name="surely: yes", exact=True)
+    await wait_until_still(output)
+    await output.hover()
     await page.mouse.down()
-    at = await way.bounding_box()
+    at = await output.bounding_box()
     meanwhile = await work.add("meanwhile", "flow/wait", "bad")
     await screen.item(meanwhile)
     await screen.settle()
-    assert await way.bounding_box() == at
+    assert await output.bounding_box() == at
     await page.mouse.up()
     await page.get_by_role("status").filter(has_text="Tap the step that follows surely").wait_for()
     await graph.locator('.react-flow__node[aria-label^="meanwhile,"]').wait_for()
@@ -310,8 +310,8 @@ async def test_straight_sequences_are_folded_except_around_the_selection(work: W
     lead = await work.add("lead", "flow/wait", "bad")
     head = work.action("into_bad_box").id
     last = next(each for each in work.project.logic if each.start == head)
-    ways = [(first, second), (second, third), (third, "END")]
-    for start, end in ways:
+    connections = [(first, second), (second, third), (third, "END")]
+    for start, end in connections:
         await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end))
     await work.client.call("UpdateLogicItem", rpc.UpdateLogicItemArgs(last.id, last.start, first))
     await work.mode("Flow")
@@ -319,41 +319,41 @@ async def test_straight_sequences_are_folded_except_around_the_selection(work: W
     await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
     await graph.locator('.react-flow__node[aria-label^="second,"] .flow-name').click()
     await work.tap_button("Fold 4 actions in the graph", work.panel)
-    one = graph.locator('.react-flow__node[aria-label="4 actions, folded, into_bad_box, first, second, third"]')
-    await one.wait_for()
+    folded = graph.locator('.react-flow__node[aria-label="4 actions, folded, into_bad_box, first, second, third"]')
+    await folded.wait_for()
     inner = graph.locator('.react-flow__node[aria-label^="second,"]')
     await expect(inner).to_have_count(0)
     await screen.picture("program folded")
     # A selected action is unfolded, and folded again when deselected.
     await work.select("second")
     await inner.wait_for()
-    await expect(one).to_have_count(0)
+    await expect(folded).to_have_count(0)
     await work.screen.close_panels()
-    await one.wait_for()
-    # A step to the folded sequence leads to its first action.
+    await folded.wait_for()
+    # A connection to the folded sequence leads to its first action.
     await work.tap_button("lead: next", graph)
-    await one.locator(".flow-name").click()
+    await folded.locator(".flow-name").click()
     step = await work.next_event("LogicItemChanged", lambda event: event.data.start == lead)
     assert step.data.end == head
-    # A fault is unfolded as well: here a removed step.
+    # A sequence with a fault is unfolded as well. Here the fault is a removed step.
     out = next(each for each in (await work.saved()).logic if each.start == third)
     await work.client.call("RemoveLogicItem", rpc.RemoveLogicItemArgs(out.id))
     await work.screen.close_panels()
     await inner.wait_for()
     await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(third, "END"))
-    await one.wait_for()
+    await folded.wait_for()
     # The folding is stored per user until it is switched off.
     await work.mode("3D")
     await work.mode("Flow")
     await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
-    await one.locator(".flow-name").click()
+    await folded.locator(".flow-name").click()
     await inner.wait_for()
     await work.mode("3D")
 
 
 async def test_action_is_renamed_and_duplicated(work: Work) -> None:
     page = work.screen.page
-    look = await work.add("look_there", "robot/get_digital_input", "good", "seen", number=number(3))
+    source = await work.add("look_there", "robot/get_digital_input", "good", "seen", number=number(3))
     await work.select("look_there")
     await work.tap_button("Rename", work.panel)
     name = work.panel.get_by_label("New name")
@@ -368,8 +368,8 @@ async def test_action_is_renamed_and_duplicated(work: Work) -> None:
     await work.tap_button(texts.DUPLICATE, work.panel)
     copy = (await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.ADD)).data
     saved = {each.id: each for point in (await work.saved()).action_points for each in point.actions}
-    assert (saved[copy.id].type, saved[copy.id].parameters) == (saved[look].type, [number(3)])
-    assert saved[copy.id].flows[0].outputs not in ([], ["seen"]), "each result has a name of its own"
+    assert (saved[copy.id].type, saved[copy.id].parameters) == (saved[source].type, [number(3)])
+    assert saved[copy.id].flows[0].outputs not in ([], ["seen"]), "the result has no new name"
     await work.panel.get_by_role("heading", name=copy.name, exact=True).wait_for()
     await work.tap_button(texts.REMOVE, work.panel)
     await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
@@ -377,13 +377,13 @@ async def test_action_is_renamed_and_duplicated(work: Work) -> None:
 
 
 async def test_removed_action_is_bridged_and_restored_by_one_undo(work: Work) -> None:
-    """Meanwhile the steps to it lead to its successor."""
+    """Until then, the steps to the removed action lead to its successor."""
     page = work.screen.page
     before = await work.saved()
     close, test, after = (work.action(name).id for name in ("close", "test", "open_again"))
     await work.select("test")
     await work.tap_button(texts.REMOVE, work.panel)
-    # It is in use by a condition: refused with the name, and nothing is removed.
+    # An action whose result a condition uses is not removed. The message names the action.
     await work.screen.sees("A result of test is used by a condition of the logic")
     assert (await work.saved()).logic == before.logic
     await work.select("close")
@@ -396,10 +396,10 @@ async def test_removed_action_is_bridged_and_restored_by_one_undo(work: Work) ->
     await page.get_by_role("button", name="Undo removing the action close").click()
     await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.ADD)
 
-    async def back() -> bool:
+    async def restored() -> bool:
         return bool((await work.saved()).logic == before.logic)
 
-    await until(back, "all of it is back by one undo")
+    await until(restored, "one undo restores the action and its steps")
     assert after in {each.end for each in before.logic}
 
 
@@ -416,7 +416,7 @@ async def test_steps_in_the_view_can_be_hidden(work: Work) -> None:
     await work.screen.item(step)
 
 
-async def test_step_in_the_view_and_integer_condition_with_else(work: Work) -> None:
+async def test_steps_added_in_the_3d_view_get_a_number_condition_and_an_else(work: Work) -> None:
     screen, page = work.screen, work.screen.page
     await work.mode("3D")
     count = await work.add("how_many", "counter/value", "bad", "many")
@@ -432,25 +432,25 @@ async def test_step_in_the_view_and_integer_condition_with_else(work: Work) -> N
     await screen.tap(rest)
     plain = (await work.next_event("LogicItemChanged")).data
     assert (plain.start, plain.end, plain.condition) == (count, rest, UNSET)
-    # Next to it a step with a condition: the first one becomes the else branch.
+    # A second step gets a condition, and the first one becomes the else branch.
     await work.select("how_many")
     await work.tap_button("Connect", work.panel)
     await work.tap_button("at_three", work.panel)
-    asked = (await work.next_event("LogicItemChanged")).data
-    assert (asked.end, asked.condition.value) == (three, "0")
+    conditional = (await work.next_event("LogicItemChanged")).data
+    assert (conditional.end, conditional.condition.value) == (three, "0")
     value = work.panel.get_by_label("Value of many")
     await value.fill("3")
     await value.press("Enter")
     changed = await work.next_event("LogicItemChanged")
-    assert (changed.change_type, changed.data.id) == (ChangeType.UPDATE, asked.id)
+    assert (changed.change_type, changed.data.id) == (ChangeType.UPDATE, conditional.id)
     assert (changed.data.condition.what, changed.data.condition.value) == (f"{count}/default/0", "3")
     await work.select("how_many")
     await work.panel.get_by_text("many = 3").wait_for()
     await work.panel.get_by_text("else").wait_for()
 
 
-async def test_a_condition_of_several_comparisons(work: Work) -> None:
-    """A range of a number, and a result of an earlier action: in the panel of the connection, without code."""
+async def test_a_condition_combines_several_comparisons(work: Work) -> None:
+    """Combine a range of a number and a result of an earlier action in the panel of the connection."""
     page = work.screen.page
     check = await work.add("check_door", "robot/get_digital_input", "good", "closed", number=number(1))
     count = await work.add("how_many_parts", "counter/value", "bad", "parts")
@@ -512,8 +512,8 @@ async def test_program_fault_is_listed_and_leads_to_its_action(work: Work) -> No
     await work.panel.get_by_role("heading", name="lonely", exact=True).wait_for()
     assert (await work.screen.page.evaluate("id => __engine.item(id).visible", lonely)) is True
     await work.tap_button(texts.REMOVE, work.panel)
-    gone = await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
-    assert gone.data.id == lonely
+    removed = await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
+    assert removed.data.id == lonely
     await work.tool(texts.PROGRAM)
     await expect(fault).to_have_count(0)
 
@@ -524,19 +524,19 @@ async def test_device_setting_is_overridden_in_one_project(work: Work) -> None:
     settings = work.panel.get_by_role("region", name="Device settings")
     await settings.get_by_label("Device").select_option(label="tester")
     field = settings.get_by_label("port", exact=True)
-    scenes = await field.input_value()
+    scene_value = await field.input_value()
     await field.fill("1502")
     await field.press("Enter")
     replaced = await work.next_event("OverrideUpdated")
     assert (replaced.change_type, replaced.parent_id) == (ChangeType.ADD, work.object("tester"))
     assert (replaced.data.name, replaced.data.value) == ("port", "1502")
-    await settings.get_by_text(f"In the scene: {scenes}").wait_for()
+    await settings.get_by_text(f"In the scene: {scene_value}").wait_for()
     await settings.get_by_role("button", name="Reset port to the scene").click()
     assert (await work.next_event("OverrideUpdated")).change_type is ChangeType.REMOVE
-    await expect(field).to_have_value(scenes)
+    await expect(field).to_have_value(scene_value)
 
 
-async def test_start_is_dragged_for_all_users(work: Work) -> None:
+async def test_dragged_start_is_stored_for_all_users(work: Work) -> None:
     page = work.screen.page
     await work.mode("3D")
     await page.evaluate("__engine.focus('START')")
@@ -553,12 +553,12 @@ async def test_start_is_dragged_for_all_users(work: Work) -> None:
     after = (await work.screen.item("START"))["pose"]["position"]
     assert after["z"] == pytest.approx(before["z"])
     assert math.dist(before.values(), after.values()) > 0.02
-    kept = await work.client.call("GetViewState", rpc.GetViewStateArgs("shared", work.project.id))  # type: ignore[arg-type]
-    assert math.dist(kept.values["place/START"].values(), after.values()) < 1e-6
+    state = await work.client.call("GetViewState", rpc.GetViewStateArgs("shared", work.project.id))  # type: ignore[arg-type]
+    assert math.dist(state.values["place/START"].values(), after.values()) < 1e-6
 
 
 async def test_code_is_edited_and_imported(work: Work) -> None:
-    """Errors are shown at their line; the changes are reviewed, and imported as one step of undo."""
+    """Errors are shown at their line. The changes are reviewed and imported as one step of undo."""
     page, screen = work.screen.page, work.screen
     await screen.close_panels()
     await work.mode("Code")
@@ -594,7 +594,7 @@ async def test_code_is_edited_and_imported(work: Work) -> None:
         assert await screen.faults() == []
         await screen.picture(f"program code error {name}")
     await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
-    # The draft survives another view; what is typed instead can be imported.
+    # The draft survives a change of the view. A corrected draft can be imported.
     await work.mode("3D")
     await work.mode("Code")
     wrong = code.locator(".cm-line", has_text="reader.dance()")
@@ -602,7 +602,7 @@ async def test_code_is_edited_and_imported(work: Work) -> None:
     await page.keyboard.press("End")
     for _ in "reader.dance()":
         await page.keyboard.press("Backspace")
-    # Its completion inserts the call with fields, and the signature is shown meanwhile.
+    # A completion inserts the call with fields, and the signature is shown while the user types.
     await page.keyboard.type("flow.wa")
     await code.get_by_role("option", name="wait").click()
     await expect(code.locator(".cm-signature strong")).to_contain_text("seconds")
@@ -639,7 +639,7 @@ async def test_code_is_edited_and_imported(work: Work) -> None:
     await work.mode("3D")
 
 
-async def test_program_panel_layout(work: Work) -> None:
+async def test_program_panel_has_no_layout_faults(work: Work) -> None:
     page, screen = work.screen.page, work.screen
     found: dict[str, list[str]] = {}
     for tab in ("Add", "Actions", "Check", "Variables"):
@@ -655,7 +655,7 @@ async def test_program_panel_layout(work: Work) -> None:
 
 
 async def test_messages_cover_no_control(work: Work) -> None:
-    """Neither in the panels nor in any view, at any size."""
+    """Check the panels and all views on tablets and on a phone."""
     page, screen = work.screen.page, work.screen
     found: dict[str, list[str]] = {}
 
@@ -689,7 +689,7 @@ async def test_messages_cover_no_control(work: Work) -> None:
 
 
 async def test_project_without_logic_has_no_program(work: Work) -> None:
-    """Its actions are executed one by one or by a script; the editor does not ask for steps."""
+    """Its actions are executed one by one or by a script; the editor does not require steps."""
     page = work.screen.page
     await work.client.call("CloseProject")
     await work.client.call("NewProject", rpc.NewProjectArgs(work.scene.id, "Loose actions", has_logic=False))

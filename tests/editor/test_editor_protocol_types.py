@@ -11,5 +11,5 @@ async def test_editor_types_match_the_structs() -> None:
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, str(EDITOR / "protocol_types.py"), "--check"), stderr=asyncio.subprocess.PIPE
     )
-    _, said = await asyncio.wait_for(process.communicate(), 30)
-    assert process.returncode == 0, said.decode()
+    _, output = await asyncio.wait_for(process.communicate(), 30)
+    assert process.returncode == 0, output.decode()

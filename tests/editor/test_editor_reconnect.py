@@ -1,4 +1,4 @@
-"""The server is killed and started again: users see it and continue where they were."""
+"""The server is killed and started again: users see the connection loss and continue where they were."""
 
 import pytest
 from playwright.async_api import Browser
@@ -41,11 +41,11 @@ async def test_the_view_stays_while_the_server_is_gone_and_reconnects(browser: B
         assert (await screen.item(table))["pose"]["position"]["x"] == 0.2
         await screen.page.get_by_role("complementary").get_by_role("heading", name="table").wait_for()
         # A new tab shows the unsaved changes, too.
-        async with screen_of(browser, cell.url) as again:
-            await again.join("Eva's other tab")
-            await again.sees("Your unsaved changes are still available")
-            await again.sees(texts.NOT_SAVED)
-            assert (await again.item(table))["name"] == "table"
+        async with screen_of(browser, cell.url) as second_tab:
+            await second_tab.join("Eva's other tab")
+            await second_tab.sees("Your unsaved changes are still available")
+            await second_tab.sees(texts.NOT_SAVED)
+            assert (await second_tab.item(table))["name"] == "table"
         await screen.press(texts.SAVE)
         await screen.sees("saved")
         await screen.until("() => !document.querySelector('.document').textContent.includes('not saved')")

@@ -14,13 +14,13 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import ActionParameter
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
-from tests.editor.programming import Work, at_work
+from tests.editor.programming import Work, project_on_screen
 from tests.editor.screen import screen_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
-BEGUN = 60_000
-"""Timeout for a started program to run: it is built and its host started, on a busy machine, ms."""
+START_TIMEOUT = 60_000
+"""Timeout for a program to start, ms. On a busy machine, building it and starting its host take long."""
 
 
 STORE = '''
@@ -51,7 +51,7 @@ async def opened(module_cell: Cell, browser: Browser) -> AsyncIterator[Work]:
     async with httpx.AsyncClient(timeout=60, base_url=module_cell.url.replace("ws", "http", 1)) as rest:
         answer = await rest.put("/object-types", json={"id": "Store", "name": "Store", "source": STORE})
         assert answer.status_code == 200, answer.text
-    async with at_work(module_cell, browser, ("store", "Store")) as open_project:
+    async with project_on_screen(module_cell, browser, ("store", "Store")) as open_project:
         yield open_project
 
 
@@ -72,16 +72,16 @@ async def go_offline(work: Work) -> None:
     await work.screen.page.get_by_role("button", name=texts.GO_ONLINE, exact=True).wait_for()
 
 
-async def state(work: Work, wanted: PackageStateEnum) -> None:
+async def wait_for_state(work: Work, wanted: PackageStateEnum) -> None:
     await work.next_event("PackageState", lambda event: event.data.state is wanted)
 
 
-async def is_broken_at(work: Work, *ids: str) -> bool:
+async def has_breakpoints(work: Work, *ids: str) -> bool:
     breakpoints = await work.client.call("GetBreakpoints", rpc.GetBreakpointsArgs(work.project.id))
     return list(breakpoints.ids) == list(ids)
 
 
-async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: Browser) -> None:
+async def test_run_stops_before_an_action_and_a_step_shows_its_failure(work: Work, browser: Browser) -> None:
     """There is no code in front of the reader: the scan fails, and the user sees why."""
     screen, page = work.screen, work.screen.page
     scan = work.action("scan").id
@@ -91,15 +91,15 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
     await graph.get_by_role("button", name="Fold sequences").click()
     await graph.locator('.react-flow__node[aria-label^="8 actions, folded, scan, open"]').wait_for()
     await work.select("scan")
-    looked_from = await page.evaluate("__engine.view.camera.position.toArray()")
+    camera_position = await page.evaluate("__engine.view.camera.position.toArray()")
     work.taps = 1  # the tap that selected it
     await work.tap_button("Run to here", work.panel)
     assert work.taps <= 2
     bar = page.get_by_role("group", name=texts.PROGRAM_STATE)
-    await bar.get_by_text("before scan").wait_for(timeout=BEGUN)
-    await state(work, PackageStateEnum.PAUSED)
-    await until(lambda: is_broken_at(work, scan), "the breakpoint is everybody's")
-    assert await page.evaluate("__engine.view.camera.position.toArray()") == looked_from, "the view stays where it was"
+    await bar.get_by_text("before scan").wait_for(timeout=START_TIMEOUT)
+    await wait_for_state(work, PackageStateEnum.PAUSED)
+    await until(lambda: has_breakpoints(work, scan), "all users have the breakpoint")
+    assert await page.evaluate("__engine.view.camera.position.toArray()") == camera_position, "the view has moved"
     await work.tool(texts.RUN)
     trace = work.panel.get_by_role("region", name="Trace")
     await trace.get_by_role("button", name="more_boards").click()
@@ -107,13 +107,13 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
     await expect(trace).to_contain_text("times")
     await expect(trace).to_contain_text("boards_left")
     await expect(trace.get_by_role("button", name="scan")).to_contain_text("waiting")
-    for _ in ("the tool", "what is selected"):
+    for _ in ("tool", "selection"):
         await page.get_by_role("button", name=texts.CLOSE_PANEL).click()
-    here = graph.locator('.react-flow__node[aria-label^="scan,"]')
-    await expect(here).to_contain_text("next")
+    scan_node = graph.locator('.react-flow__node[aria-label^="scan,"]')
+    await expect(scan_node).to_contain_text("next")
     # The graph shows the running action at a readable size.
-    await expect(here).to_be_in_viewport(ratio=1)
-    box = await here.bounding_box()
+    await expect(scan_node).to_be_in_viewport(ratio=1)
+    box = await scan_node.bounding_box()
     assert box is not None
     assert box["width"] > 200
     await screen.picture("run paused")
@@ -128,7 +128,7 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
         await seen.get_by_role("button", name="more_boards").wait_for()
         await seen.get_by_role("button", name="Remove breakpoint at scan").wait_for()
         await seen.get_by_role("button", name="Remove breakpoint at scan").click()
-        await until(lambda: is_broken_at(work), "it is gone for everybody")
+        await until(lambda: has_breakpoints(work), "the breakpoint is removed for all users")
     await expect(work.panel.get_by_role("button", name="Remove breakpoint at scan")).to_have_count(0)
 
     await work.tap_button(texts.STEP, bar)
@@ -140,9 +140,9 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
     fault = work.panel.get_by_role("region", name="Last run").filter(has_text="Run failed in scan")
     await fault.wait_for()
     await expect(fault).to_contain_text("no code was read")
-    await state(work, PackageStateEnum.STOPPED)
+    await wait_for_state(work, PackageStateEnum.STOPPED)
     await screen.sees("failed")
-    assert await page.evaluate("__engine.view.camera.position.toArray()") == looked_from
+    assert await page.evaluate("__engine.view.camera.position.toArray()") == camera_position
     await graph.locator('.react-flow__node[aria-label^="8 actions, folded"]').wait_for()
     await screen.picture("run failed")
     # The result stays and leads to the action.
@@ -155,15 +155,15 @@ async def test_stop_ends_the_run_and_editing_is_possible_again(work: Work) -> No
     await work.tool(texts.RUN)
     await work.tap_button(texts.START_PAUSED, work.panel)
     bar = page.get_by_role("group", name=texts.PROGRAM_STATE)
-    await bar.get_by_role("button", name=texts.STOP, exact=True).wait_for(timeout=BEGUN)
+    await bar.get_by_role("button", name=texts.STOP, exact=True).wait_for(timeout=START_TIMEOUT)
     await bar.get_by_text("before more_boards").wait_for()
     # Meanwhile editing is refused with the reason.
     await work.select("test")
     await work.panel.get_by_role("button", name=texts.DUPLICATE).click(force=True)
     await work.screen.sees("Stop the program first.")
     await work.tap_button(texts.STOP, bar)
-    assert await page.get_by_role("alertdialog").count() == 0, "nobody is asked"
-    await state(work, PackageStateEnum.STOPPED)
+    assert await page.get_by_role("alertdialog").count() == 0, "a confirmation is requested"
+    await wait_for_state(work, PackageStateEnum.STOPPED)
     await bar.wait_for(state="hidden")
     await work.panel.get_by_role("heading", name="test", exact=True).wait_for()
     await expect(work.panel.get_by_role("button", name=texts.DUPLICATE, exact=True)).to_be_enabled()
@@ -210,7 +210,7 @@ async def test_choices_come_from_the_device_and_stay_when_it_is_offline(work: Wo
     await go_offline(work)
     await expect(work.panel.get_by_text("Last known choices.")).to_have_count(2)
     assert await board.locator("option").all_inner_texts() == [f"lower board {number}" for number in range(4)]
-    # Nothing is known of another shelf.
+    # The boards of another shelf are not known.
     await shelf.get_by_text("cellar").click()
     await work.panel.get_by_text("Go online to load the choices.").wait_for()
 
@@ -228,13 +228,13 @@ async def test_package_is_built_under_the_proposed_name(work: Work) -> None:
     assert package.package_meta.name == work.project.name
 
 
-async def test_a_dry_run_predicts_the_cycle_and_shows_what_fails(work: Work) -> None:
+async def test_a_dry_run_predicts_the_cycle_and_shows_the_failing_action(work: Work) -> None:
     """Nothing moves and the scene stays offline."""
     screen, page = work.screen, work.screen.page
     await work.tool(texts.RUN)
     predicted = work.panel.get_by_role("region", name="Dry run", exact=True)
     await work.tap_button("Dry run", predicted)
-    await predicted.get_by_text("No problems found.").wait_for(timeout=BEGUN)
+    await predicted.get_by_text("No problems found.").wait_for(timeout=START_TIMEOUT)
     await expect(predicted).to_contain_text("Bottleneck")
     chart = predicted.get_by_role("region", name="Chart: Dry run 1")
     robot = chart.get_by_role("img", name="robot: busy for")
@@ -251,19 +251,19 @@ async def test_a_dry_run_predicts_the_cycle_and_shows_what_fails(work: Work) -> 
     await predicted.get_by_text("The program was edited since.").wait_for()
     await work.tap_button("Dry run", predicted)
     problem = predicted.get_by_role("alert")
-    await expect(problem).to_contain_text("into_good_box would fail", timeout=BEGUN)
+    await expect(problem).to_contain_text("into_good_box would fail", timeout=START_TIMEOUT)
     await expect(problem).to_contain_text("reaches at most")
     await predicted.get_by_label("Compare with").select_option("dry 1")
     await predicted.get_by_role("table").get_by_text("into_good_box").wait_for()
     await problem.get_by_role("button", name="Show into_good_box").click()
     await page.get_by_role("complementary").get_by_role("heading", name="into_good_box", exact=True).wait_for()
 
-    # It starts at the selected action on request, and takes another branch.
+    # On request, the dry run starts at the selected action and takes another branch.
     await work.panel.get_by_role("button", name="Dry run from here").click()
-    await predicted.get_by_role("button", name="Dry run from into_good_box").wait_for(timeout=BEGUN)
+    await predicted.get_by_role("button", name="Dry run from into_good_box").wait_for(timeout=START_TIMEOUT)
     await predicted.get_by_text("Branches", exact=True).click()
     await predicted.get_by_label("take_out").select_option("passed = no → into_bad_box")
     await screen.picture("dry run from here")
     assert await screen.faults() == []
     await work.tap_button("Dry run", predicted)
-    await predicted.get_by_text("No problems found.").wait_for(timeout=BEGUN)
+    await predicted.get_by_text("No problems found.").wait_for(timeout=START_TIMEOUT)

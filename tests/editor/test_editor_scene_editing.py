@@ -24,7 +24,9 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 @dataclass
-class Open:
+class OpenedScene:
+    """An open scene, and a second client."""
+
     cell: Cell
     client: Client
     scene: Scene
@@ -49,16 +51,16 @@ class Open:
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def opened(cell: Cell) -> AsyncIterator[Open]:
+async def opened(cell: Cell) -> AsyncIterator[OpenedScene]:
     """The scene is open and saved."""
     client = await cell.client("colleague")
     scene, _ = await cell.open(client)
     await client.call("CloseProject")
     await client.call("OpenScene", rpc.IdArgs(scene.id))
-    yield Open(cell, client, scene)
+    yield OpenedScene(cell, client, scene)
 
 
-async def _granted(client: Client, request: str, args: Any) -> bool:
+async def _succeeds(client: Client, request: str, args: Any) -> bool:
     try:
         await client.call(request, args)
     except Exception:
@@ -71,15 +73,15 @@ async def tool(screen: Screen, name: str) -> None:
 
 
 async def handle(screen: Screen, name: str) -> tuple[float, float]:
-    """Move the pointer to a handle of the gizmo, and return where it is on the page.
+    """Move the pointer to a handle of the gizmo, and return its position on the page.
 
-    The panel that comes with a selection makes the view narrower, a frame later: it is there when the handle is lit
-    below the pointer, twice.
+    The panel of a selection makes the view narrower one frame later. So wait until the handle is highlighted under the
+    pointer twice at the same position.
     """
-    lit = 0
+    times = 0
 
-    async def is_lit() -> bool:
-        nonlocal lit
+    async def is_highlighted() -> bool:
+        nonlocal times
         at = await screen.until("name => window.__engine?.gizmo.places()[name]", name)
         box = await screen.page.locator(".view canvas").bounding_box()
         assert box is not None
@@ -88,15 +90,15 @@ async def handle(screen: Screen, name: str) -> tuple[float, float]:
         await screen.page.mouse.move(*found[-1])
         await screen.settle()
         cursor = await screen.page.locator(".view canvas").evaluate("canvas => canvas.style.cursor")
-        lit = lit + 1 if cursor == "grab" and found[-1] == found[max(0, len(found) - 2)] else 0
-        return lit >= 2
+        times = times + 1 if cursor == "grab" and found[-1] == found[max(0, len(found) - 2)] else 0
+        return times >= 2
 
     found: list[tuple[float, float]] = []
-    await until(is_lit, f"the handle {name} is lit", 20)
+    await until(is_highlighted, f"the handle {name} is highlighted", 20)
     return found[-1]
 
 
-async def chosen(screen: Screen, item: str) -> None:
+async def select(screen: Screen, item: str) -> None:
     """Tap an object and wait for its panel."""
     await screen.item(item)
     await screen.page.evaluate("id => window.__engine.focus(id)", item)
@@ -104,12 +106,12 @@ async def chosen(screen: Screen, item: str) -> None:
     await screen.page.get_by_role("region", name=texts.PLACE, exact=True).wait_for()
 
 
-async def test_object_is_dragged_previewed_to_others_and_undone(opened: Open, browser: Browser) -> None:
+async def test_drag_of_an_object_is_previewed_to_other_users_and_undone(opened: OpenedScene, browser: Browser) -> None:
     client, tester = opened.client, next(each for each in opened.scene.objects if each.name == "tester")
     await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"MovePreview"}))
     async with screen_of(browser, opened.cell.url) as screen:
         await screen.join("Eva")
-        await chosen(screen, tester.id)
+        await select(screen, tester.id)
         before = await opened.pose("tester")
         x, y = await handle(screen, "axis z")
         mouse = screen.page.mouse
@@ -119,13 +121,13 @@ async def test_object_is_dragged_previewed_to_others_and_undone(opened: Open, br
         # Other users see the preview and who drags; the document is unchanged so far.
         preview = await client.next_event("MovePreview")
         assert (preview.data.id, preview.data.user) == (tester.id, "Eva")
-        assert not await _granted(client, "WriteLock", rpc.WriteLockArgs(tester.id))
+        assert not await _succeeds(client, "WriteLock", rpc.WriteLockArgs(tester.id))
         assert await opened.pose("tester") == before
         shown = (await screen.item(tester.id))["pose"]["position"]
         assert shown["z"] > before.position.z + 0.005
         await screen.picture("drag")
         await mouse.up()
-        await until(lambda: _moved(opened, before.position.z), "the server has it")
+        await until(lambda: _has_moved(opened, before.position.z), "the server has the new pose")
         after = await opened.pose("tester")
         assert after.position.z == pytest.approx(shown["z"], abs=1e-9)
         assert (after.position.x, after.position.y, after.orientation) == (
@@ -133,16 +135,16 @@ async def test_object_is_dragged_previewed_to_others_and_undone(opened: Open, br
             before.position.y,
             before.orientation,
         )
-        await until(lambda: _granted(client, "WriteLock", rpc.WriteLockArgs(tester.id)), "the lock is given back")
+        await until(lambda: _succeeds(client, "WriteLock", rpc.WriteLockArgs(tester.id)), "the lock is released")
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(tester.id))
 
         # It is one edit, named on the button, undone and redone by keys.
         await screen.page.get_by_role("button", name="Undo moving the object tester").wait_for()
         await screen.page.keyboard.press("Control+z")
-        await until(lambda: _is_at(opened, before.position.z), "it is taken back")
+        await until(lambda: _is_at(opened, before.position.z), "the move is undone")
         await screen.page.get_by_role("button", name="Redo moving the object tester").wait_for()
         await screen.page.keyboard.press("Control+Shift+Z")
-        await until(lambda: _is_at(opened, after.position.z), "it is done again")
+        await until(lambda: _is_at(opened, after.position.z), "the move is redone")
 
         # Escape cancels a drag.
         x, y = await handle(screen, "axis x")
@@ -157,7 +159,7 @@ async def test_object_is_dragged_previewed_to_others_and_undone(opened: Open, br
         assert await opened.pose("tester") == after
 
         # An edit of another user in between blocks Undo; the message names the user.
-        await until(lambda: _granted(client, "WriteLock", rpc.WriteLockArgs(tester.id)), "the lock is given back")
+        await until(lambda: _succeeds(client, "WriteLock", rpc.WriteLockArgs(tester.id)), "the lock is released")
         await screen.sees("In use by colleague")
         assert await screen.page.evaluate("window.__engine.gizmo.shown") is False
         await client.call("UpdateObjectPose", rpc.UpdateObjectPoseArgs(tester.id, before))
@@ -166,27 +168,27 @@ async def test_object_is_dragged_previewed_to_others_and_undone(opened: Open, br
         await expect(screen.page.get_by_role("alert").filter(has_text="colleague")).to_be_visible()
 
 
-async def _moved(opened: Open, z: float) -> bool:
+async def _has_moved(opened: OpenedScene, z: float) -> bool:
     pose = await opened.pose("tester")
     return abs(pose.position.z - z) > 1e-4
 
 
-async def _is_at(opened: Open, z: float) -> bool:
+async def _is_at(opened: OpenedScene, z: float) -> bool:
     pose = await opened.pose("tester")
     return abs(pose.position.z - z) < 1e-9
 
 
-async def test_steps_and_typed_numbers_place_an_object_exactly(opened: Open, browser: Browser) -> None:
+async def test_steps_and_typed_numbers_place_an_object_exactly(opened: OpenedScene, browser: Browser) -> None:
     feeder = next(each for each in opened.scene.objects if each.name == "feeder_box")
     async with screen_of(browser, opened.cell.url, touch=True) as screen:
         await screen.join("Eva")
-        await chosen(screen, feeder.id)
+        await select(screen, feeder.id)
         place = screen.page.get_by_role("region", name=texts.PLACE, exact=True)
         start = await opened.pose("feeder_box")
         before = await opened.client.call("History", rpc.HistoryArgs())
         # Two quick steps are one edit.
         await place.get_by_role("button", name="Increase Z by 1 cm").dblclick()
-        await until(lambda: _at(opened, "z", start.position.z + 0.02), "two steps up")
+        await until(lambda: _has_coordinate(opened, "z", start.position.z + 0.02), "two steps up")
         edits = await opened.client.call("History", rpc.HistoryArgs())
         new = [edit for edit in edits.edits if edit not in before.edits]
         assert [edit.request for edit in new] == ["UpdateSceneObjectPose"]
@@ -199,39 +201,39 @@ async def test_steps_and_typed_numbers_place_an_object_exactly(opened: Open, bro
             await place.get_by_role("button", name=re.compile(f"^{axis.upper()} .*enter a value")).click()
             await place.get_by_role("textbox").fill(typed)
             await screen.page.keyboard.press("Enter")
-            await until(lambda axis=axis, value=value: _at(opened, axis, value), typed)  # type: ignore[misc]
-        # With the keys on the screen, in another unit, as a relative change.
+            await until(lambda axis=axis, value=value: _has_coordinate(opened, axis, value), typed)  # type: ignore[misc]
+        # The keys on the screen enter a relative change in another unit.
         await place.get_by_role("button", name=re.compile("^Z .*enter a value")).click()
         await place.get_by_role("button", name="Change by").click()
         for key in ("minus", "5", "in cm"):
             await place.get_by_role("button", name=key, exact=True).click()
         await screen.picture("number pad")
         await place.get_by_role("button", name="Set", exact=True).click()
-        await until(lambda: _at(opened, "z", start.position.z + 0.02 - 0.05), "5 cm down")
+        await until(lambda: _has_coordinate(opened, "z", start.position.z + 0.02 - 0.05), "5 cm down")
 
-        # Rotated by a typed angle, then squared up.
+        # The object is rotated by a typed angle, then aligned to the axes.
         await place.get_by_role("radio", name="Turn").click()
         await place.get_by_role("button", name=re.compile("^Yaw .*enter a value")).click()
         await place.get_by_role("textbox").fill("80")
         await screen.page.keyboard.press("Enter")
-        await until(lambda: _yaw(opened, math.radians(80)), "turned by 80°")
+        await until(lambda: _has_yaw(opened, math.radians(80)), "turned by 80°")
         await place.get_by_role("button", name="Align to axes").click()
-        await until(lambda: _yaw(opened, math.pi / 2), "squared")
+        await until(lambda: _has_yaw(opened, math.pi / 2), "the object is aligned")
         await place.get_by_role("button", name="Reset").click()
-        await until(lambda: _same(opened, start), "as it was at first")
+        await until(lambda: _has_pose(opened, start), "the initial pose is restored")
 
 
-async def _at(opened: Open, axis: str, value: float) -> bool:
+async def _has_coordinate(opened: OpenedScene, axis: str, value: float) -> bool:
     pose = await opened.pose("feeder_box")
     return bool(abs(getattr(pose.position, axis) - value) < 1e-9)
 
 
-async def _yaw(opened: Open, angle: float) -> bool:
+async def _has_yaw(opened: OpenedScene, angle: float) -> bool:
     pose = await opened.pose("feeder_box")
     return abs(abs(pose.orientation.z) - math.sin(angle / 2)) < 1e-9
 
 
-async def _same(opened: Open, start: Pose) -> bool:
+async def _has_pose(opened: OpenedScene, start: Pose) -> bool:
     pose = await opened.pose("feeder_box")
     return (
         math.dist(tuple(pose.position), tuple(start.position)) < 1e-9
@@ -239,7 +241,7 @@ async def _same(opened: Open, start: Pose) -> bool:
     )
 
 
-async def test_shapes_are_added_resized_copied_and_removed(opened: Open, browser: Browser) -> None:
+async def test_shapes_are_added_resized_copied_and_removed(opened: OpenedScene, browser: Browser) -> None:
     client = opened.client
     async with screen_of(browser, opened.cell.url) as screen:
         await screen.join("Ida")  # a user without stored settings
@@ -256,27 +258,27 @@ async def test_shapes_are_added_resized_copied_and_removed(opened: Open, browser
         await place.get_by_role("button", name=re.compile("^Height .*enter a value")).click()
         await place.get_by_role("textbox").fill("25cm")
         await screen.page.keyboard.press("Enter")
-        await until(lambda: _measures(client, "cylinder", 0.05, 0.25), "25 cm high")
-        # Resized by its upper face: the lower one stays.
+        await until(lambda: _has_size(client, "cylinder", 0.05, 0.25), "25 cm high")
+        # Dragging the upper face resizes the object. The lower face stays.
         low = (await opened.pose("cylinder")).position.z - 0.125
         x, y = await handle(screen, "face +z")
         await screen.page.mouse.move(x, y)
         await screen.page.mouse.down()
         await screen.page.mouse.move(x, y - 30, steps=3)
         await screen.page.mouse.up()
-        await until(lambda: _taller(client, "cylinder", 0.25), "pulled")
+        await until(lambda: _taller(client, "cylinder", 0.25), "the cylinder is taller")
         height = await _height(client, "cylinder")
-        await until(lambda: _stands(opened, low + height / 2), "its lower face has stayed")
+        await until(lambda: _is_centred_at(opened, low + height / 2), "the lower face has not moved")
 
         await screen.press(texts.DUPLICATE)
         await panel.get_by_role("heading", name="cylinder_2", exact=True).wait_for()
         assert await _height(client, "cylinder_2") == height
         await screen.press(texts.REMOVE)
-        await until(lambda: _gone(opened, "cylinder_2"), "removed")
+        await until(lambda: _is_missing(opened, "cylinder_2"), "removed")
         await screen.page.get_by_role("button", name="Undo removing the object cylinder_2").click()
-        await until(lambda: opened.has("cylinder_2"), "it is back")
+        await until(lambda: opened.has("cylinder_2"), "the removed object is restored")
 
-        # An object in use names its projects.
+        # Removing an object in use lists the projects that use it.
         await tool(screen, texts.OBJECTS)
         await screen.page.get_by_role("row", name="tester").click()
         await screen.press(texts.REMOVE)
@@ -292,12 +294,12 @@ async def test_shapes_are_added_resized_copied_and_removed(opened: Open, browser
         await name.press("Enter")
         await until(lambda: opened.has("tester_b"), "renamed")
 
-        # Hidden objects are neither drawn nor targeted; stored per user.
+        # Hidden objects are neither drawn nor selectable. They are stored per user.
         await panel.get_by_text(texts.HIDE).click()
         tester = await opened.object("tester_b")
         await screen.until("id => window.__engine.item(id)?.visible === false", tester.id)
-        kept = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, opened.scene.id, "Ida"))
-        assert kept.values["blocklist"] == [tester.id]
+        state = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, opened.scene.id, "Ida"))
+        assert state.values["blocklist"] == [tester.id]
 
 
 async def _height(client: Client, name: str) -> float:
@@ -305,7 +307,7 @@ async def _height(client: Client, name: str) -> float:
     return float(model.cylinder.height)
 
 
-async def _measures(client: Client, name: str, radius: float, height: float) -> bool:
+async def _has_size(client: Client, name: str, radius: float, height: float) -> bool:
     model = next(each for each in await client.call("GetObjectTypes") if each.type == name).object_model
     return (model.cylinder.radius, model.cylinder.height) == (radius, height)
 
@@ -314,24 +316,24 @@ async def _taller(client: Client, name: str, than: float) -> bool:
     return await _height(client, name) > than + 0.001
 
 
-async def _stands(opened: Open, z: float) -> bool:
+async def _is_centred_at(opened: OpenedScene, z: float) -> bool:
     pose = await opened.pose("cylinder")
     return abs(pose.position.z - z) < 1e-9
 
 
-async def _gone(opened: Open, name: str) -> bool:
+async def _is_missing(opened: OpenedScene, name: str) -> bool:
     return not await opened.has(name)
 
 
 def wedge() -> bytes:
-    """A binary STL of a wedge, 200 × 100 × 150 mm, in mm."""
+    """Return a binary STL of a wedge, 200 × 100 × 150 mm, in mm."""
     a, b, c, d = (0, 0, 0), (200, 0, 0), (0, 100, 0), (0, 0, 150)
     faces = ((a, c, b), (a, b, d), (a, d, c), (b, c, d))
     body = b"".join(struct.pack("<12fH", 0, 0, 0, *(v for corner in face for v in corner), 0) for face in faces)
     return bytes(80) + struct.pack("<I", len(faces)) + body
 
 
-async def test_devices_are_added_by_a_form_and_meshes_with_their_unit(opened: Open, browser: Browser) -> None:
+async def test_devices_are_added_by_a_form_and_meshes_with_their_unit(opened: OpenedScene, browser: Browser) -> None:
     async with screen_of(browser, opened.cell.url) as screen:
         await screen.join("Eva")
         await screen.item(opened.scene.objects[0].id)
@@ -378,5 +380,5 @@ async def test_devices_are_added_by_a_form_and_meshes_with_their_unit(opened: Op
         assert (await screen.item(added.id))["kind"] == "object"
 
 
-async def _setting(opened: Open, name: str, value: str) -> bool:
+async def _setting(opened: OpenedScene, name: str, value: str) -> bool:
     return value in {parameter.value.strip('"') for parameter in (await opened.object(name)).parameters}

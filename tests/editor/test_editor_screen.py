@@ -1,4 +1,4 @@
-"""Screens do not see what earlier screens of the same browser context stored."""
+"""A screen does not see data that earlier screens of the same browser context stored."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ _STORED = """async () => ({
 })"""
 
 
-async def test_a_context_is_reused_without_what_is_stored(cell: Cell, browser: Browser) -> None:
+async def test_a_reused_context_has_no_stored_data(cell: Cell, browser: Browser) -> None:
     async def stored(**options: Any) -> tuple[object, dict[str, object]]:
         async with screen_of(browser, cell.url, **options) as screen:
             await screen.page.goto(f"{screen.url}/?q=low")

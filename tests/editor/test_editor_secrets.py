@@ -1,4 +1,4 @@
-"""A secret setting in the browser: typed once, never shown or sent again, and kept when other settings are saved."""
+"""A secret setting in the browser is never shown or sent again, and is preserved when other settings are saved."""
 
 import hashlib
 import re
@@ -57,7 +57,7 @@ async def open_add_panel(screen: Screen, search: str) -> None:
     await screen.page.get_by_role("complementary").get_by_label("Search").fill(search)
 
 
-async def test_a_secret_is_write_only_and_kept_when_other_settings_are_saved(cell: Cell, browser: Browser) -> None:
+async def test_a_secret_is_write_only_and_preserved_when_other_settings_are_saved(cell: Cell, browser: Browser) -> None:
     await upload(cell, TYPE)
     client = await cell.client("colleague")
     await client.call("NewScene", rpc.NewSceneArgs("safe"))
@@ -89,19 +89,19 @@ async def test_a_secret_is_write_only_and_kept_when_other_settings_are_saved(cel
         await expect(code).to_have_attribute("placeholder", texts.SECRET_IS_STORED)
         await expect(code).to_have_attribute("type", "password")
 
-        # Another setting is saved: the secret is neither asked for nor lost.
+        # Saving another setting neither requests nor loses the secret.
         label = settings.get_by_label("label", exact=True)
         await label.fill("north wall")
         await label.press("Enter")
         await screen.press(texts.SAVE_SETTINGS)
-        await until(lambda: _has(client, "north wall"), "the setting is saved")
+        await until(lambda: _is_saved(client, "north wall"), "the setting is saved")
         await expect(code).to_have_attribute("placeholder", texts.SECRET_IS_STORED)
         await client.call("StartScene")
-        await scene_state(client, SceneStateEnum.STARTED, 30)  # the device got the code
+        await scene_state(client, SceneStateEnum.STARTED, 30)  # the device received the code
         await client.call("StopScene")
         await scene_state(client, SceneStateEnum.STOPPED, 30)
 
-        # A new code takes the place of the stored one.
+        # A new code replaces the stored one.
         await code.fill("halibut-0815")
         await code.press("Enter")
         await screen.press(texts.SAVE_SETTINGS)
@@ -114,7 +114,7 @@ async def test_a_secret_is_write_only_and_kept_when_other_settings_are_saved(cel
         assert CODE not in await page.content()
 
 
-async def _has(client: Client, value: str) -> bool:
+async def _is_saved(client: Client, value: str) -> bool:
     try:
         await client.call("SaveScene")
     except LockedByOther:  # the page holds the lock of the device until its settings are stored

@@ -1,4 +1,4 @@
-"""The Stop dock and the jog pad: no control is ever below Stop, and nothing moves or is covered during a hold."""
+"""The Stop dock and the jog pad: Stop covers no control, and no control moves or is covered during a hold."""
 
 import contextlib
 import time
@@ -37,8 +37,8 @@ class Online:
 
     async def ask_for_robot(self) -> None:
         """Send a message to the user who has locked the robot."""
-        wish = {f"asked/{self.robot}": {"by": "colleague", "at": time.time() * 1000}}
-        await self.colleague.call("SetViewState", rpc.SetViewStateArgs(ViewScope.SHARED, wish, self.project.id))
+        request = {f"asked/{self.robot}": {"by": "colleague", "at": time.time() * 1000}}
+        await self.colleague.call("SetViewState", rpc.SetViewStateArgs(ViewScope.SHARED, request, self.project.id))
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
@@ -69,12 +69,12 @@ async def test_no_control_reaches_into_the_stop_dock(
         stop = page.get_by_role("button", name=texts.STOP_MOTION)
         found: dict[str, list[str]] = {}
 
-        async def check(what: str, picture: bool = True) -> None:
+        async def check(label: str, picture: bool = True) -> None:
             await screen.settle()
             if faults := await screen.faults():
-                found[what] = faults
+                found[label] = faults
             if picture:
-                await screen.picture(f"dock {what}")
+                await screen.picture(f"dock {label}")
 
         await screen.join("Eva")
         await stop.wait_for()
@@ -106,11 +106,11 @@ async def test_no_control_reaches_into_the_stop_dock(
             await resize(screen, size)
             await stop.wait_for()
             await check(f"operator, {size}")
-        assert not found, "\n".join(f"{what}: {fault}" for what, faults in found.items() for fault in faults)
+        assert not found, "\n".join(f"{label}: {fault}" for label, faults in found.items() for fault in faults)
 
 
 async def hold(page: Page, button: Locator) -> None:
-    """Hold a button until the panel shows who moves the robot. A press that ends by itself is repeated."""
+    """Hold a button until the panel shows the user who moves the robot. If the hold ends by itself, press again."""
 
     async def reported() -> bool:
         if await button.get_attribute("data-held") != "true":
@@ -123,10 +123,10 @@ async def hold(page: Page, button: Locator) -> None:
 
 
 async def faults_during_hold(online: Online, screen: Screen, tab: str, size: str) -> list[str]:
-    """Hold a button of a pad while a message arrives, and return what moved or was covered."""
+    """Hold a button of a pad while a message arrives, and return the controls that moved or were covered."""
     page = screen.page
     panel = page.get_by_role("complementary")
-    await panel.get_by_role("radiogroup", name=texts.HOW_TO_MOVE).get_by_role("radio", name=tab, exact=True).click()
+    await panel.get_by_role("radiogroup", name=texts.ROBOT_CONTROL).get_by_role("radio", name=tab, exact=True).click()
     if tab != "By hand":
         await panel.get_by_role("radio", name=texts.HOLD_TO_MOVE).click()
     button = panel.locator("button.hold:not([aria-disabled])").last
@@ -137,15 +137,15 @@ async def faults_during_hold(online: Online, screen: Screen, tab: str, size: str
     assert shown == BUTTONS.get(tab, shown), f"only {shown} buttons are visible"
     message = page.get_by_text("colleague asks for").first
 
-    async def asked() -> bool:
-        """Only who holds the robot gets the message: on a busy computer, the hold may have ended before it arrives."""
+    async def message_is_shown() -> bool:
+        """Only the user who holds the robot gets the message. On a busy computer, the hold may end before."""
         await hold(page, button)
         await online.ask_for_robot()
         with contextlib.suppress(Error):
             await message.wait_for(timeout=5_000)
         return await message.is_visible()
 
-    await until(asked, "the message is shown during a hold", 60)
+    await until(message_is_shown, "the message is shown during a hold", 60)
     frames = await page.evaluate("window.padFrames")
     await screen.until("(before) => window.padFrames > before + 3", frames)
     await screen.picture(f"hold {tab} {size}")
@@ -172,4 +172,4 @@ async def test_nothing_moves_or_is_covered_during_a_hold(
             for tab in ("Tool", "Joints", "By hand"):
                 if faults := await faults_during_hold(online, screen, tab, size):
                     found[f"{tab}, {size}"] = faults
-        assert not found, "\n".join(f"{what}: {fault}" for what, faults in found.items() for fault in faults)
+        assert not found, "\n".join(f"{label}: {fault}" for label, faults in found.items() for fault in faults)

@@ -16,10 +16,10 @@ from tests.editor.screen import Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(400)]
 
-SLOWLY = "2"
+SPEED = "2"
 """Speed, % of the maximum."""
-GOOD = 3
-"""A seed with a good board: the robot ends at a place with free space around it."""
+SEED = 3
+"""Seed of a good board. The robot ends at a position with free space around it."""
 
 SHOWS = "() => document.querySelector('.home') ? 'home' : window.__engine?.frames > 0 && 'workplace'"
 """The screen after joining: the demo may have left its project open."""
@@ -28,7 +28,7 @@ SHOWS = "() => document.querySelector('.home') ? 'home' : window.__engine?.frame
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def workplace(tmp_path_factory: pytest.TempPathFactory, built_editor: object) -> AsyncIterator[Run]:
     """`make run` after its program has ended."""
-    async with demo(tmp_path_factory.mktemp("demo"), "--boards", "1", "--seed", str(GOOD)) as run:
+    async with demo(tmp_path_factory.mktemp("demo"), "--boards", "1", "--seed", str(SEED)) as run:
         await until(
             lambda: "The server runs at" in run.output or run.process.returncode is not None, "the cycle to end", 200
         )
@@ -58,17 +58,17 @@ class User:
         truth: dict[str, Any] = await self.workplace.command_fake("robot", "truth")
         return truth
 
-    async def moving(self) -> bool:
+    async def is_moving(self) -> bool:
         return bool((await self.robot())["moving"])
 
-    async def resting(self) -> bool:
-        return not await self.moving()
+    async def is_still(self) -> bool:
+        return not await self.is_moving()
 
-    async def at_height(self, of: float) -> bool:
+    async def is_at_height(self, wanted: float) -> bool:
         height: float = (await self.robot())["tcp_pose"][2]
-        return abs(height - of) < 1e-3
+        return abs(height - wanted) < 1e-3
 
-    async def online(self) -> None:
+    async def go_online(self) -> None:
         await self.screen.press(texts.GO_ONLINE)
         await self.page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=40_000)
 
@@ -85,7 +85,7 @@ class User:
         return await self.title()
 
 
-async def test_a_tablet_can_afford_the_view_of_the_demo(workplace: Run, browser: Browser) -> None:
+async def test_view_of_the_demo_is_within_the_draw_limits_of_a_tablet(workplace: Run, browser: Browser) -> None:
     at = workplace.at()
     assert at is not None
     async with screen_of(browser, at["url"]) as screen:
@@ -105,14 +105,14 @@ async def test_a_tablet_can_afford_the_view_of_the_demo(workplace: Run, browser:
         await screen.picture("demo")
 
 
-async def test_the_first_day(workplace: Run, browser: Browser) -> None:
+async def test_a_new_user_teaches_programs_and_runs_the_robot(workplace: Run, browser: Browser) -> None:
     at = workplace.at()
     assert at is not None
     async with screen_of(browser, at["url"], touch=True) as screen:
         user = User(screen, workplace)
         page = screen.page
 
-        # Join; see the cell move.
+        # Join, create a project and go online.
         await screen.join("Newcomer")
         if await screen.until(SHOWS) == "workplace":
             await screen.press(texts.CLOSE_DOCUMENT)
@@ -120,7 +120,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await screen.press(texts.NEW_PROJECT)
         await page.get_by_role("dialog").get_by_label("Name").fill("First day")
         await screen.press(texts.CREATE)
-        await user.online()
+        await user.go_online()
         await user.tool(texts.ROBOT)
         await user.panel.get_by_role("radiogroup", name="Step, mm").get_by_text("100", exact=True).click()
 
@@ -139,7 +139,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         )
         await user.tool(texts.ROBOT)
         await screen.press("Move along +Z")
-        await until(lambda: user.at_height(taught + 0.1), "the arm is 100 mm higher", 20)
+        await until(lambda: user.is_at_height(taught + 0.1), "the arm is 100 mm higher", 20)
         shown = """z => __engine.ids().map((id) => __engine.item(id)).some(({ kind, endEffectors }) =>
             kind === "robot" && endEffectors?.some((tool) => Math.abs(tool.position.z - z) < 0.3))"""
         await screen.until(shown, taught + 0.1)
@@ -158,7 +158,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await expect(number).to_have_value("1")
         move = await user.add_action("move Move the TCP to a pose.", f"{check}: if no")
         speed = user.panel.get_by_label("speed", exact=True)
-        await speed.fill(SLOWLY)
+        await speed.fill(SPEED)
         await speed.press("Enter")
         await screen.press(texts.CLOSE_PANEL)
         await user.mode("Flow")
@@ -175,12 +175,12 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await expect(bar).to_contain_text(f"before {move}", timeout=60_000)
         await screen.picture("story paused")
         await bar.get_by_role("button", name=texts.RESUME).click()
-        await until(user.moving, "the arm moves")
+        await until(user.is_moving, "the arm moves")
         await page.get_by_role("button", name=texts.STOP_MOTION).click()
-        await until(user.resting, "the arm rests", 2)
-        assert (await user.robot())["tcp_pose"][2] > taught + 0.005, "it had come to the end"
+        await until(user.is_still, "the arm has stopped", 2)
+        assert (await user.robot())["tcp_pose"][2] > taught + 0.005, "the arm has completed the motion"
         await expect(bar).to_be_hidden()
-        still = (await user.robot())["q"]
+        joints = (await user.robot())["q"]
 
         # Undo a removal.
         await user.tool(texts.OBJECTS)
@@ -193,7 +193,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
 
         # Disconnect a cable: the message names the device.
         if await page.get_by_role("button", name=texts.GO_ONLINE).is_visible():
-            await user.online()
+            await user.go_online()
         await user.tool(texts.DEVICES)
         row = user.panel.get_by_role("listitem").filter(has_text="robot").filter(has_text="online")
         await row.wait_for()
@@ -204,4 +204,4 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await workplace.command_fake("robot", "heal")
         await user.panel.get_by_role("listitem").filter(has_text="robot").filter(has_text="online").wait_for()
         await asyncio.sleep(0.3)
-        assert (await user.robot())["q"] == pytest.approx(still, abs=1e-3), "it moved by itself"
+        assert (await user.robot())["q"] == pytest.approx(joints, abs=1e-3), "the arm has moved by itself"

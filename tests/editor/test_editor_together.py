@@ -29,7 +29,7 @@ DRAWN = """() => Object.fromEntries(__engine.ids().map((id) => [id, __engine.ite
   .filter(([, item]) => item.kind === "point").map(([id, { name, pose }]) => [id, [name, pose.position]]))"""
 
 
-async def edits_at_a_screen(screen: Screen, seed: int) -> None:
+async def edit_on_screen(screen: Screen, seed: int) -> None:
     """Move the selected point and undo, as fast as the page allows."""
     chance = random.Random(seed)
     panel = screen.page.get_by_role("complementary")
@@ -49,13 +49,13 @@ async def _added(client: Client, name: str) -> str:
             return found
 
 
-async def edits_by_requests(client: Client, seed: int) -> None:
-    """Add, rename and remove points by the protocol."""
+async def edit_by_requests(client: Client, seed: int) -> None:
+    """Add, rename and remove points through the protocol."""
     chance = random.Random(seed)
     own: list[str] = []
     for number in range(EDITS):
-        what = chance.choice(("add", "add", "rename", "remove")) if own else "add"
-        if what == "add":
+        edit = chance.choice(("add", "add", "rename", "remove")) if own else "add"
+        if edit == "add":
             place = Position(chance.random() / 2, chance.random() / 2, 0.2)
             await client.call("AddActionPoint", rpc.AddActionPointArgs(f"third_{number}", place))
             own.append(await _added(client, f"third_{number}"))
@@ -63,14 +63,14 @@ async def edits_by_requests(client: Client, seed: int) -> None:
         point = chance.choice(own)
         # Only this user edits these points: each request succeeds and releases its lock.
         await client.call("WriteLock", rpc.WriteLockArgs(point))
-        if what == "rename":
+        if edit == "rename":
             await client.call("RenameActionPoint", rpc.RenameActionPointArgs(point, f"renamed_{number}"))
         else:
             await client.call("RemoveActionPoint", rpc.IdArgs(point))
             own.remove(point)
 
 
-def places(scene: Scene, project: Project) -> dict[str, tuple[str, tuple[float, float, float]]]:
+def world_positions(scene: Scene, project: Project) -> dict[str, tuple[str, tuple[float, float, float]]]:
     """Return names and world positions of all points of the documents."""
     frames = {each.id: each.pose for each in scene.objects if isinstance(each.pose, Pose)}
     points = {each.id: each for each in project.action_points}
@@ -89,7 +89,7 @@ def places(scene: Scene, project: Project) -> dict[str, tuple[str, tuple[float, 
     return found
 
 
-def same(drawn: dict[str, Any], wanted: dict[str, tuple[str, tuple[float, float, float]]]) -> bool:
+def is_same(drawn: dict[str, Any], wanted: dict[str, tuple[str, tuple[float, float, float]]]) -> bool:
     return drawn.keys() == wanted.keys() and all(
         drawn[point][0] == name and math.dist(drawn[point][1].values(), at) < 1e-6
         for point, (name, at) in wanted.items()
@@ -108,9 +108,9 @@ async def test_concurrent_edits_converge(cell: Cell, browser: Browser) -> None:
             await screen.page.get_by_role("row", name=f"{point.name} Action point").click()
         await one.page.get_by_role("img", name=f"Adam, at {point.name}").wait_for()
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(edits_at_a_screen(one, SEED))
-            tasks.create_task(edits_at_a_screen(two, SEED + 1))
-            tasks.create_task(edits_by_requests(client, SEED + 2))
+            tasks.create_task(edit_on_screen(one, SEED))
+            tasks.create_task(edit_on_screen(two, SEED + 1))
+            tasks.create_task(edit_by_requests(client, SEED + 2))
 
         async def opened() -> Project:
             """Return the open project as a new client receives it."""
@@ -120,10 +120,10 @@ async def test_concurrent_edits_converge(cell: Cell, browser: Browser) -> None:
                 return shown
 
         async def agree() -> bool:
-            now = places(scene, await opened())
-            return all([same(await screen.page.evaluate(DRAWN), now) for screen in (one, two)])
+            now = world_positions(scene, await opened())
+            return all([is_same(await screen.page.evaluate(DRAWN), now) for screen in (one, two)])
 
-        await until(agree, "both draw what the server has", 15)
+        await until(agree, "both screens show the state of the server", 15)
         # Points were added, and all locks are released.
         assert len((await opened()).action_points) > len(project.action_points)
         await client.call("WriteLock", rpc.WriteLockArgs(point.id))

@@ -27,7 +27,9 @@ SLOW = 0.05
 
 
 @dataclass
-class Place:
+class Workplace:
+    """A closed project, and a second client."""
+
     cell: Cell
     client: Client
     scene: Scene
@@ -36,16 +38,16 @@ class Place:
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def place(cell: Cell) -> AsyncIterator[Place]:
+async def workplace(cell: Cell) -> AsyncIterator[Workplace]:
     """The project, saved and closed, and a second client, "colleague"."""
     client = await cell.client("colleague")
     scene, project = await cell.open(client)
     await client.call("CloseProject")
     robot = next(each.id for each in scene.objects if each.name == "robot")
-    yield Place(cell, client, scene, project, robot)
+    yield Workplace(cell, client, scene, project, robot)
 
 
-async def _granted(client: Client, request: str, args: Any = None, **options: Any) -> bool:
+async def _succeeds(client: Client, request: str, args: Any = None, **options: Any) -> bool:
     try:
         await client.call(request, args, **options)
     except Exception:
@@ -53,7 +55,7 @@ async def _granted(client: Client, request: str, args: Any = None, **options: An
     return True
 
 
-def apart(a: dict[str, Any], b: dict[str, Any]) -> float:
+def distance(a: dict[str, Any], b: dict[str, Any]) -> float:
     return math.dist(a["position"].values(), b["position"].values())
 
 
@@ -70,53 +72,53 @@ async def goal(client: Client, robot: str, down: float) -> rpc.MoveToPoseArgs:
     return rpc.MoveToPoseArgs(robot, tool, 1.0, now.position, now.orientation, safe=False)
 
 
-async def opened_and_online(screen: Screen, place: Place) -> None:
+async def open_and_go_online(screen: Screen, workplace: Workplace) -> None:
     await screen.join("Eva")
-    await screen.press(texts.open_document(place.project.name))
-    await screen.item(place.robot)
+    await screen.press(texts.open_document(workplace.project.name))
+    await screen.item(workplace.robot)
     await screen.press(texts.GO_ONLINE)
     await screen.page.get_by_role("button", name=texts.STOP_MOTION).wait_for()
 
 
-async def test_join_open_project_and_see_the_robot_move(place: Place, browser: Browser) -> None:
-    client = place.client
-    async with screen_of(browser, place.cell.url, drawn=True) as screen:
+async def test_view_follows_the_robot_and_draws_nothing_at_standstill(workplace: Workplace, browser: Browser) -> None:
+    client = workplace.client
+    async with screen_of(browser, workplace.cell.url, drawn=True) as screen:
         await screen.join("Eva")
         await screen.sees("on PCB testing")
-        await screen.press(texts.open_document(place.project.name))
-        shown = await screen.item(place.robot)
+        await screen.press(texts.open_document(workplace.project.name))
+        shown = await screen.item(workplace.robot)
         assert (shown["kind"], shown["name"], shown["endEffectors"]) == ("robot", "robot", [])
         # Opening changes nothing.
         assert texts.NOT_SAVED not in (await screen.page.locator(".document").text_content() or "")
-        actions = [action for point in place.project.action_points for action in point.actions]
+        actions = [action for point in workplace.project.action_points for action in point.actions]
         ids = set(await screen.page.evaluate("window.__engine.ids()"))
-        assert {action.id for action in actions} | {item.id for item in place.project.logic} <= ids
+        assert {action.id for action in actions} | {item.id for item in workplace.project.logic} <= ids
         # A point is drawn relative to its parent.
-        point = place.project.action_points[0]
+        point = workplace.project.action_points[0]
         drawn = (await screen.item(point.id))["pose"]["position"]
-        parent = next((each for each in place.scene.objects if each.id == point.parent), None)
+        parent = next((each for each in workplace.scene.objects if each.id == point.parent), None)
         expected = point.position if parent is None else (parent.pose * Pose(point.position)).position  # type: ignore[operator]
         assert math.dist(drawn.values(), tuple(expected)) < 1e-6
 
-        await _still(screen)
+        await _wait_until_still(screen)
         await screen.press(texts.GO_ONLINE)
         await screen.page.get_by_role("button", name=texts.STOP_MOTION).wait_for()
-        before = await tcp(screen, place.robot)
-        await _still(screen)
-        await _nothing_drawn_while_heard_of(screen, place.robot)
-        await client.call("MoveToPose", await goal(client, place.robot, 0.1))
+        before = await tcp(screen, workplace.robot)
+        await _wait_until_still(screen)
+        await _check_reports_cause_no_frames(screen, workplace.robot)
+        await client.call("MoveToPose", await goal(client, workplace.robot, 0.1))
         await screen.until(
             "([id, z]) => Math.abs(window.__engine.item(id).endEffectors[0].position.z - (z - 0.1)) < 0.001",
-            [place.robot, before["position"]["z"]],
+            [workplace.robot, before["position"]["z"]],
         )
-        moved = await tcp(screen, place.robot)
-        assert apart(before, moved) == pytest.approx(0.1, abs=0.002)
+        moved = await tcp(screen, workplace.robot)
+        assert distance(before, moved) == pytest.approx(0.1, abs=0.002)
 
-        await _still(screen)
-        await _nothing_drawn_while_heard_of(screen, place.robot)
+        await _wait_until_still(screen)
+        await _check_reports_cause_no_frames(screen, workplace.robot)
 
 
-async def _still(screen: Screen) -> None:
+async def _wait_until_still(screen: Screen) -> None:
     """Wait until nothing has been drawn for half a second."""
     await screen.until(
         """() => {
@@ -127,10 +129,10 @@ async def _still(screen: Screen) -> None:
     )
 
 
-async def _nothing_drawn_while_heard_of(screen: Screen, robot: str) -> None:
-    """Check that forty joint reports of a robot at standstill cause no frame, and one frame no other.
+async def _check_reports_cause_no_frames(screen: Screen, robot: str) -> None:
+    """Check that forty joint reports of a robot at standstill draw no frame, and that a requested frame draws no other.
 
-    Where a busy machine keeps them back for longer, the arm is shown as not heard of, and it begins anew.
+    If a busy machine delays a report by 0.4 s or more, the view shows the robot without a signal. Then check again.
     """
     for _ in range(10):
         drawn, asked, pause = await screen.page.evaluate(
@@ -157,37 +159,37 @@ async def _nothing_drawn_while_heard_of(screen: Screen, robot: str) -> None:
     assert 0 < drawn <= asked
 
 
-async def test_stop_motion_stops_a_motion_of_another_user(place: Place, browser: Browser) -> None:
-    client = place.client
-    async with screen_of(browser, place.cell.url) as screen:
-        await opened_and_online(screen, place)
-        start = await tcp(screen, place.robot)
-        arguments = await goal(client, place.robot, 0.2)
+async def test_stop_motion_stops_a_motion_of_another_user(workplace: Workplace, browser: Browser) -> None:
+    client = workplace.client
+    async with screen_of(browser, workplace.cell.url) as screen:
+        await open_and_go_online(screen, workplace)
+        start = await tcp(screen, workplace.robot)
+        arguments = await goal(client, workplace.robot, 0.2)
         await client.call("MoveToPose", _slowly(arguments))
         await screen.until(
             "([id, z]) => window.__engine.item(id).endEffectors[0].position.z < z - 0.005",
-            [place.robot, start["position"]["z"]],
+            [workplace.robot, start["position"]["z"]],
         )
         await screen.page.get_by_role("button", name=texts.STOP_MOTION).click()
         ended = await client.next_event("RobotMoveToPose")
         while ended.data.move_event_type.value == "start":
             ended = await client.next_event("RobotMoveToPose")
         rest = await client.call(
-            "GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(place.robot, arguments.end_effector_id)
+            "GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(workplace.robot, arguments.end_effector_id)
         )
-        assert rest.position.z > start["position"]["z"] - 0.15, "it went on to the end"
+        assert rest.position.z > start["position"]["z"] - 0.15, "the robot has completed the motion"
 
 
 def _slowly(to: rpc.MoveToPoseArgs) -> rpc.MoveToPoseArgs:
     return rpc.MoveToPoseArgs(to.robot_id, to.end_effector_id, SLOW, to.position, to.orientation, safe=False)
 
 
-async def test_edits_and_locks_of_another_user_are_shown(place: Place, browser: Browser) -> None:
-    client = place.client
-    async with screen_of(browser, place.cell.url) as screen:
+async def test_edits_and_locks_of_another_user_are_shown(workplace: Workplace, browser: Browser) -> None:
+    client = workplace.client
+    async with screen_of(browser, workplace.cell.url) as screen:
         await screen.join("Eva")
-        await screen.press(texts.open_document(place.project.name))
-        await screen.item(place.robot)
+        await screen.press(texts.open_document(workplace.project.name))
+        await screen.item(workplace.robot)
         await client.call("AddActionPoint", rpc.AddActionPointArgs("lonely", Pose().position))
         added = await client.next_event("ActionPointChanged")
         new = added.data.id
@@ -205,40 +207,40 @@ async def test_edits_and_locks_of_another_user_are_shown(place: Place, browser: 
         asked = await client.next_event("ViewStateChanged")
         assert (asked.data.scope, asked.data.values[f"asked/{new}"]["by"]) == (ViewScope.SHARED, "Eva")
         await about.get_by_text("Request sent to colleague").wait_for()
-        lock = place.project.action_points[0].id
+        lock = workplace.project.action_points[0].id
         await screen.page.evaluate("id => window.__engine.focus(id)", lock)
         await screen.tap(lock)
         panel = screen.page.get_by_role("complementary")
-        await panel.get_by_role("heading", name=place.project.action_points[0].name).wait_for()
+        await panel.get_by_role("heading", name=workplace.project.action_points[0].name).wait_for()
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(new))
         await screen.until("id => window.__engine.item(id).badge === ''", new)
         await screen.sees("lonely is free now.")
 
 
-async def test_locks_of_a_lost_page_are_released_when_the_user_returns(place: Place, browser: Browser) -> None:
-    client = place.client
-    await client.call("OpenProject", rpc.IdArgs(place.project.id))
-    point = rpc.WriteLockArgs(place.project.action_points[0].id)
-    async with Client(place.cell.url, "Kim", reconnect=False) as before:
+async def test_locks_of_a_lost_page_are_released_when_the_user_returns(workplace: Workplace, browser: Browser) -> None:
+    client = workplace.client
+    await client.call("OpenProject", rpc.IdArgs(workplace.project.id))
+    point = rpc.WriteLockArgs(workplace.project.action_points[0].id)
+    async with Client(workplace.cell.url, "Kim", reconnect=False) as before:
         await before.call("WriteLock", point)
     with pytest.raises(RequestFailed, match="Kim"):
         await client.call("WriteLock", point)
-    async with screen_of(browser, place.cell.url) as screen:
+    async with screen_of(browser, workplace.cell.url) as screen:
         await screen.join("Kim")
-        await screen.item(place.robot)
-        await until(lambda: _granted(client, "WriteLock", point), "the lock is given back")
+        await screen.item(workplace.robot)
+        await until(lambda: _succeeds(client, "WriteLock", point), "the lock is released")
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(point.object_id))
 
 
-async def test_online_without_a_device_and_retry(place: Place, browser: Browser) -> None:
-    async with screen_of(browser, place.cell.url) as screen:
+async def test_workplace_goes_online_without_a_device_and_retries_it(workplace: Workplace, browser: Browser) -> None:
+    async with screen_of(browser, workplace.cell.url) as screen:
         page = screen.page
         await screen.join("Rita")
-        await screen.press(texts.open_document(place.project.name))
-        await screen.item(place.robot)
+        await screen.press(texts.open_document(workplace.project.name))
+        await screen.item(workplace.robot)
         await _tool(screen, texts.DEVICES)
         await screen.sees("The workplace is offline.")
-        await place.cell.command_fake("tester", "refuse")
+        await workplace.cell.command_fake("tester", "refuse")
         try:
             await screen.press(texts.GO_ONLINE)
             tester = page.get_by_role("listitem").filter(has=page.get_by_text("tester", exact=True))
@@ -248,16 +250,16 @@ async def test_online_without_a_device_and_retry(place: Place, browser: Browser)
             await expect(robot).to_contain_text("online", timeout=40_000)
             await page.get_by_role("button", name="Online. 1 device fault. Press to go offline").wait_for()
             listed = await page.get_by_role("list").get_by_role("listitem").all_inner_texts()
-            assert [text.split()[0] for text in listed] == ["tester", "flow", "reader", "robot"]  # no boxes
-            assert place.cell.at["tester"]["modbus"].split(":")[0] in await tester.inner_text()
-            # The longest words of the switch.
+            assert [text.split()[0] for text in listed] == ["tester", "flow", "reader", "robot"]  # boxes are not listed
+            assert workplace.cell.at["tester"]["modbus"].split(":")[0] in await tester.inner_text()
+            # The switch now has its longest text.
             await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
             await screen.settle()
             assert not await screen.faults_with(FONTS)
             await screen.picture("device fault phone")
             await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
         finally:
-            await place.cell.command_fake("tester", "heal")
+            await workplace.cell.command_fake("tester", "heal")
         await screen.press("Retry tester")
         await expect(tester).not_to_contain_text("not reachable", timeout=40_000)
         await page.get_by_role("button", name=texts.GO_OFFLINE).wait_for()
@@ -267,8 +269,8 @@ async def test_online_without_a_device_and_retry(place: Place, browser: Browser)
         await screen.press(texts.SETTINGS)
         await page.get_by_role("menuitem", name="Messages").click()
         messages = page.get_by_role("dialog", name="Messages").get_by_role("listitem")
-        began = messages.filter(has_text="Starting the scene")
-        await expect(began).to_have_text(re.compile(r"^\d\d:\d\d:\d\dnote: .*: finished\. Not connected: tester\.$"))
+        started = messages.filter(has_text="Starting the scene")
+        await expect(started).to_have_text(re.compile(r"^\d\d:\d\d:\d\dnote: .*: finished\. Not connected: tester\.$"))
         assert not await screen.faults()
         assert not await screen.barriers()
         await screen.picture("messages")
@@ -304,13 +306,13 @@ _OUTSIDE = """() => {
 }"""
 
 
-async def test_camera_fits_the_cell_until_it_is_moved(place: Place, browser: Browser) -> None:
+async def test_camera_fits_the_cell_until_it_is_moved(workplace: Workplace, browser: Browser) -> None:
     """All actions are in the view, also next to a panel, and a moved camera stays where it is."""
-    await place.client.call("OpenProject", rpc.IdArgs(place.project.id))
-    async with screen_of(browser, place.cell.url) as screen:
+    await workplace.client.call("OpenProject", rpc.IdArgs(workplace.project.id))
+    async with screen_of(browser, workplace.cell.url) as screen:
         page = screen.page
         await screen.join("Eva")
-        await screen.item(place.project.action_points[0].id)
+        await screen.item(workplace.project.action_points[0].id)
         await screen.settle()
         for tool in ("", texts.POINTS):
             if tool:

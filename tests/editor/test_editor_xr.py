@@ -22,10 +22,10 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import ActionParameter, Flow
 from tests.e2e.harness import scene_state
 from tests.editor import texts
-from tests.editor.camera_video import MIDDLE, looking, marker_table
+from tests.editor.camera_video import MIDDLE, look_at, marker_table
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 from tests.editor.test_editor_ar import ASIDE, MAX_ASIDE, MAX_NEAR, check_stop
-from tests.editor.xr import LENS, SHOTS, Controller, emulate, in_xr, overlay_errors, place, until_fitting
+from tests.editor.xr import LENS, SHOTS, Controller, emulate, in_xr, overlay_errors, place_device, wait_for_overlay
 from tests.server.core.serving import ServerProcess, running, talking
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -52,7 +52,7 @@ async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -
 
 
 async def open_scene(client: Client) -> str:
-    """Close what an earlier test has left, open the scene, and return its id."""
+    """Close the documents that an earlier test has left, open the scene, and return its id."""
     for request in ("StopPackage", "StopScene"):
         with contextlib.suppress(RequestFailed):
             await client.call(request)
@@ -71,7 +71,7 @@ async def open_project(client: Client, scene: str, name: str) -> None:
     await client.next_event("OpenProject")
 
 
-async def joined(screen: Screen) -> str:
+async def join(screen: Screen) -> str:
     """Join, and return the id of the box."""
     await screen.join("Eva")
     await screen.until("() => window.__engine?.ids().length > 0")
@@ -81,7 +81,7 @@ async def joined(screen: Screen) -> str:
     return found
 
 
-async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProcess, browser: Browser) -> None:
+async def test_tablet_tracks_its_pose_and_markers_correct_it(server: ServerProcess, browser: Browser) -> None:
     async with (
         screen_of(browser, server.url, "ipad", touch=True) as screen,
         Client(server.url, "Adam", reconnect=False) as adam,
@@ -91,42 +91,42 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
         scene = await open_scene(adam)
         await adam.call("StartScene")
         await scene_state(adam, SceneStateEnum.STARTED)
-        box = await joined(screen)
+        box = await join(screen)
         await screen.picture("xr start")
-        # Where the session does not start or hides the page, the reason and the next step are shown.
+        # If the session does not start or hides the page, the reason and the next step are shown.
         for change, reason in (("refuses", "The browser did not start AR."), ("covers", "does not show the controls")):
             await page.evaluate("(change) => { __xr.state[change] = true; }", change)
             await screen.press("Start AR")
             await screen.sees(reason)
             await page.evaluate("(change) => { __xr.state[change] = false; }", change)
-        await place(screen, SHOTS[0])
+        await place_device(screen, SHOTS[0])
         await screen.press("Start AR")
         quality = page.get_by_role("group", name="Quality of AR")
         await expect(quality).to_have_text(re.compile(r"Good ±\d+ mm, 2 markers, now"))
-        await until_fitting(screen, SHOTS[0], [MIDDLE], MAX_NEAR)
-        await until_fitting(screen, SHOTS[0], ASIDE, MAX_ASIDE)
+        await wait_for_overlay(screen, SHOTS[0], [MIDDLE], MAX_NEAR)
+        await wait_for_overlay(screen, SHOTS[0], ASIDE, MAX_ASIDE)
         assert await screen.page.evaluate("async () => (await __xr.see()).drawn") > 1000
         await check_stop(screen)
         assert await screen.faults() == []
         await screen.picture("xr tablet")
-        # Without markers in the picture, the overlay follows the device, and its quality says so.
+        # Without markers in the picture, the overlay follows the device, and the quality shows it.
         await page.evaluate(
             "() => { const c = document.createElement('canvas'); c.width = 1180; c.height = 820; __xr.state.shot = c; }"
         )
         await expect(quality).to_have_text(re.compile("Tracked"))
-        await place(screen, SHOTS[1], picture=False)
-        await until_fitting(screen, SHOTS[1], ASIDE, MAX_ASIDE)
-        # The tracking has drifted by 30 mm: markers win, and the correction is stated.
-        await place(screen, SHOTS[2], off=(0.03, 0, 0))
+        await place_device(screen, SHOTS[1], picture=False)
+        await wait_for_overlay(screen, SHOTS[1], ASIDE, MAX_ASIDE)
+        # The tracking has drifted by 30 mm. Markers correct the overlay, and the correction is reported.
+        await place_device(screen, SHOTS[2], off=(0.03, 0, 0))
         await screen.sees(re.compile(r"The overlay was corrected by (29|30|31) mm."))
-        await until_fitting(screen, SHOTS[2], ASIDE, MAX_ASIDE)
-        # Taps on the page are no selections of WebXR; they select what is drawn there.
+        await wait_for_overlay(screen, SHOTS[2], ASIDE, MAX_ASIDE)
+        # Taps on the page are not WebXR selections. They select the item that is drawn there.
         assert not await page.evaluate(
             "document.body.dispatchEvent(new Event('beforexrselect', { cancelable: true, bubbles: true }))"
         )
         await screen.tap(box)
         await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
-        # The browser's own list of a select is not shown over the session: a dialog replaces it.
+        # The browser does not show the native list of a select over the session. A dialog replaces it.
         step = page.get_by_role("complementary").get_by_label("Step")
         await step.click()
         await screen.picture("xr list")
@@ -138,14 +138,14 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
         await screen.press("Freeze")
         await screen.sees("Frozen")
         frozen = await overlay_errors(screen, SHOTS[2], [MIDDLE])
-        await place(screen, SHOTS[0], picture=False)
+        await place_device(screen, SHOTS[0], picture=False)
         await page.evaluate("new Promise((done) => __xr.state.session.requestAnimationFrame(done))")
         assert await overlay_errors(screen, SHOTS[2], [MIDDLE]) == pytest.approx(frozen, abs=1e-6)
         drawn = await page.evaluate("__xr.see()")
         assert drawn["drawn"] == drawn["all"]
         await screen.picture("xr frozen")
         await screen.press("Continue")
-        # Lost tracking dims the overlay and says so.
+        # Lost tracking dims the overlay and is reported.
         await page.evaluate("() => { __xr.state.emulated = true; }")
         await expect(quality).to_have_text(re.compile("Position lost"))
         await page.evaluate("() => { __xr.state.emulated = false; }")
@@ -160,7 +160,7 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
         # The seat view keeps the selection and the viewpoint.
         await screen.tap(box)
         await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
-        # At the click, since a marker may correct the view before it.
+        # Read the viewpoint at the click, because a marker may correct the view before it.
         await page.evaluate(
             "() => addEventListener('click', () => { window.__eye = __engine.view.camera.position.toArray(); },"
             " { capture: true, once: true })"
@@ -190,10 +190,10 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
         await page.unroute("**/api/calibration/markers")
         await open_project(adam, scene, "Thumbs")
         await page.get_by_role("heading", name="Thumbs", exact=True).wait_for()
-        await place(screen, SHOTS[0])
+        await place_device(screen, SHOTS[0])
         await page.get_by_role("button", name="AR", exact=True).click()
         await screen.press("Start AR")
-        await until_fitting(screen, SHOTS[0], [MIDDLE], MAX_NEAR)
+        await wait_for_overlay(screen, SHOTS[0], [MIDDLE], MAX_NEAR)
         await check_programming(screen, adam)
         await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
         await screen.press(texts.SETTINGS)
@@ -207,7 +207,7 @@ _AIMED = """() => {
     const { width, height } = document.querySelector(".view").getBoundingClientRect();
     return __engine.pick(width / 2, height / 2, 0)[0]?.point ?? __engine.floor(width / 2, height / 2);
 }"""
-"""Returns the place below the crosshair."""
+"""Return the position below the crosshair."""
 
 
 async def check_programming(screen: Screen, adam: Client) -> None:
@@ -226,12 +226,12 @@ async def check_programming(screen: Screen, adam: Client) -> None:
     aimed = await page.evaluate(_AIMED)
     await button(texts.AT_CROSSHAIR, panel)
     point = (await adam.next_event("ActionPointChanged")).data
-    # Markers may correct the view by some millimetres between the two.
+    # Markers may correct the view by some millimetres between the two readings.
     assert tuple(point.position) == pytest.approx([aimed[axis] for axis in "xyz"], abs=0.01)
     orientation = (await adam.next_event("OrientationChanged")).data
     await panel.get_by_role("heading", name=point.name, exact=True).wait_for()
     await screen.close_panels()
-    await place(screen, looking(np.array((0.15, -0.55, 0.6)), LENS, tuple(point.position)))
+    await place_device(screen, look_at(np.array((0.15, -0.55, 0.6)), LENS, tuple(point.position)))
     await button(f"Select {point.name}", page.get_by_role("group", name=texts.AT_CROSSHAIR))
     await panel.get_by_role("heading", name=point.name, exact=True).wait_for()
     await button(re.compile("^Increase X by "), panel)
@@ -245,7 +245,7 @@ async def check_programming(screen: Screen, adam: Client) -> None:
     await button(re.compile("^Undo "))
     back = (await adam.next_event("OrientationChanged")).data.orientation
     assert tuple(back) == pytest.approx(tuple(orientation.orientation), abs=1e-9)
-    # Actions connect themselves; a connection is also replaced by hand.
+    # Actions are connected automatically. The user also replaces a connection.
     await button(texts.PROGRAM, rail)
     wait = panel.locator(".offer").filter(has=page.get_by_text("wait", exact=True)).last
     for _ in range(2):
@@ -295,11 +295,11 @@ HOLD = """() => {
     Object.assign(options, { release });
     Object.assign(host, { release, stopMotion: () => __held.stopped++ });
 }"""
-"""Add a button that is held, and record what ends it."""
+"""Add a button that is held, and record the releases and stops."""
 
 
 async def check_hold_ends(screen: Screen, hand: Controller) -> None:
-    """Check that a held motion ends on release and when controller, tracking or session are lost; Stop has a button."""
+    """Check that a held motion ends on release and when controller, tracking or session are lost. Stop has a button."""
     page = screen.page
     await page.evaluate(HOLD)
     await hand.button("hold")
@@ -308,7 +308,7 @@ async def check_hold_ends(screen: Screen, hand: Controller) -> None:
     await hand.press(False)
     assert not await page.evaluate("__held.pressed")
     right = "__xr.device.controllers.right"
-    for taken, given in (
+    for lose, restore in (
         ("__xr.state.lostController = true", "__xr.state.lostController = false"),
         (f"{right}.connected = false", f"{right}.connected = true"),
         ("__xr.state.emulated = true", "__xr.state.emulated = false"),
@@ -317,9 +317,9 @@ async def check_hold_ends(screen: Screen, hand: Controller) -> None:
     ):
         await hand.press(True)
         await screen.until("() => __held.pressed")
-        await page.evaluate(f"() => {{ __held.released = 0; {taken}; }}")
+        await page.evaluate(f"() => {{ __held.released = 0; {lose}; }}")
         await screen.until("() => __held.released > 0")
-        await page.evaluate(f"() => {{ {given}; }}")
+        await page.evaluate(f"() => {{ {restore}; }}")
         await hand.frames()
         await hand.press(False)
     await page.evaluate(f"{right}.updateButtonValue('b-button', 1)")
@@ -335,8 +335,8 @@ async def test_headset_registers_by_touch_selects_and_moves(server: ServerProces
         page = screen.page
         await emulate(page, headset=True)
         scene = await open_scene(adam)
-        await joined(screen)
-        await place(screen, SHOTS[0], picture=False)
+        await join(screen)
+        await place_device(screen, SHOTS[0], picture=False)
         await screen.press("Start AR")
         hand = Controller(screen)
         await screen.until("() => window.__ar?.headset")
@@ -359,7 +359,7 @@ async def test_headset_registers_by_touch_selects_and_moves(server: ServerProces
         assert re.search(r"±\d+ mm, 3 points, ", await page.evaluate(lines)), await page.evaluate(title)
         await screen.page.evaluate("__xr.see()")
         await screen.picture("xr headset")
-        # The ray selects; pressed again, it moves.
+        # A press selects the object under the ray. A second press moves it.
         top = in_xr((BOX.x, BOX.y, 0.04))
         start = np.add(top, (0.1, 0.4, 0.3))
         await hand.aim(top, start)
@@ -372,7 +372,7 @@ async def test_headset_registers_by_touch_selects_and_moves(server: ServerProces
         moved = (await adam.next_event("SceneObjectChanged")).data.pose.position
         assert tuple(moved) == pytest.approx((BOX.x + 0.1, BOX.y + 0.05, BOX.z), abs=2e-3)
         await check_hold_ends(screen, hand)
-        # A hand pinches as a controller presses; it has no button for Stop.
+        # A pinch of a tracked hand acts as a press of a controller. A hand has no Stop button.
         assert await page.evaluate("__ar.headset.reported")
         await page.evaluate("() => { __xr.device.primaryInputMode = 'hand'; }")
         await screen.until("() => __ar.headset.reported === false")
@@ -389,10 +389,10 @@ async def test_headset_registers_by_touch_selects_and_moves(server: ServerProces
         await hand.click()
         back = (await adam.next_event("SceneObjectChanged")).data.pose.position
         assert tuple(back) == pytest.approx(tuple(moved), abs=1e-6)
-        # By a pinch, the workplace is placed on the surface ahead, and again from another place.
+        # A pinch places the workplace on the surface ahead. A second pinch places it from another position.
         placed = []
         for shot in SHOTS[:2]:
-            await place(screen, shot, picture=False)
+            await place_device(screen, shot, picture=False)
             await hand.frames()
             await hand.button("place")
             await hand.click()
@@ -408,7 +408,7 @@ async def test_headset_registers_by_touch_selects_and_moves(server: ServerProces
 
 
 async def check_program(screen: Screen, adam: Client, scene: str, hand: Controller) -> None:
-    """Run a program from the headset: only with a button for Stop, and it stops when the button is lost."""
+    """Check that a program runs from the headset only with a Stop button, and stops when the button is lost."""
     page = screen.page
     await open_project(adam, scene, "From a headset")
     await adam.call("AddActionPoint", rpc.AddActionPointArgs("here", BOX))
@@ -428,7 +428,7 @@ async def check_program(screen: Screen, adam: Client, scene: str, hand: Controll
     await hand.button("run")
     await hand.click()
 
-    async def controlled() -> None:
+    async def use_controller() -> None:
         await page.evaluate("() => { __xr.device.primaryInputMode = 'controller'; }")
         await screen.until(f"() => ({disabled})('run') === false")
 
@@ -437,7 +437,7 @@ async def check_program(screen: Screen, adam: Client, scene: str, hand: Controll
         await hand.click()
         await package_state(adam, state)
 
-    await controlled()
+    await use_controller()
     await press("run", PackageStateEnum.RUNNING)
     await press("pause", PackageStateEnum.PAUSING)  # until the action ends
     await page.evaluate("__xr.see()")
@@ -446,7 +446,7 @@ async def check_program(screen: Screen, adam: Client, scene: str, hand: Controll
     await page.evaluate("() => { __xr.device.primaryInputMode = 'hand'; }")
     await package_state(adam, PackageStateEnum.STOPPED)
     await adam.next_event("OpenProject")
-    await controlled()
+    await use_controller()
     await press("run paused", PackageStateEnum.PAUSED)
     await press("resume", PackageStateEnum.RUNNING)
     # A menu of the headset covers the session.
@@ -454,7 +454,7 @@ async def check_program(screen: Screen, adam: Client, scene: str, hand: Controll
     await package_state(adam, PackageStateEnum.STOPPED)
     await adam.next_event("OpenProject")
     await page.evaluate("__xr.device.updateVisibilityState('visible')")
-    await controlled()
+    await use_controller()
     await press("run paused", PackageStateEnum.PAUSED)
     await press("step", PackageStateEnum.RUNNING)
     await press("stop program", PackageStateEnum.STOPPED)

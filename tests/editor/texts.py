@@ -66,12 +66,12 @@ NO_PROBLEMS: Final = "No problems. Ready to run."
 HIDE: Final = "Hide"
 
 # ------------------------------------------------------------------------------------------------ robot and calibration
-HOW_TO_MOVE: Final = "Control"
+ROBOT_CONTROL: Final = "Control"
 PRESS_MODE: Final = "Mode"
 HOLD_TO_MOVE: Final = "Hold to move"
-CAN_GO_THERE: Final = "Reachable. The ghost shows the pose."
+REACHABLE: Final = "Reachable. The ghost shows the pose."
 MOVE_POINT_TO_ROBOT: Final = "Move to the robot"
-PUT_IT_THERE: Final = "Update the pose"
+UPDATE_POSE: Final = "Update the pose"
 FIND_BY_MARKERS: Final = "Calibrate with markers"
 SHOW_ON_TOOL: Final = "Preview on the tool"
 

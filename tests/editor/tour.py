@@ -18,6 +18,7 @@ JOINING: Final[Any] = {
     "fingerprint": ":".join(["A0"] * 32),
     "authority": ":".join(["B1"] * 32),
 }
+"""Answer of a server that others can join."""
 GREY_CAMERA = """() => {
     const canvas = Object.assign(document.createElement("canvas"), { width: 640, height: 480 });
     const context = canvas.getContext("2d");
@@ -114,7 +115,7 @@ class Tour:
         await page.get_by_role("dialog").get_by_role("button", name=words("Add person"), exact=True).wait_for()
         async for shown in self._dialog("persons"):
             yield shown
-        # As on a server that others can join.
+        # Answer like a server that others can join.
         await page.route("**/api/joining", lambda route: route.fulfill(json=JOINING))
         for key, name in (("?", "about, with the addresses to join"), ("/", "search")):
             await page.keyboard.press(key)
@@ -225,7 +226,7 @@ class Tour:
             yield shown
 
     async def functions(self, call: str, parallel: str) -> AsyncIterator[str]:
-        """Visit functions and parallel work of the open project, with the names of a call and of parallel work."""
+        """Visit functions and parallel work of the open project. `call` and `parallel` are names of actions."""
         page, words = self.screen.page, self.words
         await self._choice("3D").click()
         await self._tool(texts.PROGRAM)
@@ -265,7 +266,7 @@ class Tour:
         yield "dry run"
 
     async def augmented(self) -> AsyncIterator[str]:
-        """Visit AR with a camera that shows nothing."""
+        """Visit AR with a camera whose picture is grey."""
         page, words = self.screen.page, self.words
         await page.evaluate(GREY_CAMERA)
         await self._button("AR").click()
@@ -283,7 +284,7 @@ class Tour:
         await page.get_by_role("button", name=words(texts.STOP_MOTION)).wait_for()
         await self._tool(texts.ROBOT)
         for tab in ("Tool", "Joints", "By hand", "Go to"):
-            tabs = page.get_by_role("radiogroup", name=words(texts.HOW_TO_MOVE))
+            tabs = page.get_by_role("radiogroup", name=words(texts.ROBOT_CONTROL))
             await tabs.get_by_role("radio", name=words(tab), exact=True).click()
             yield f"robot, {tab}"
         await self._tool(texts.DEVICES)
@@ -291,7 +292,7 @@ class Tour:
         await self._button(texts.CLOSE_PANEL).click()
 
     async def camera(self) -> AsyncIterator[str]:
-        """Visit the section of a camera that is online, with a picture, and a calibration that is refused."""
+        """Visit the section of an online camera, with a picture and a refused calibration."""
         page, words = self.screen.page, self.words
         await page.get_by_role("button", name=words(texts.STOP_MOTION)).wait_for()
         await self._select("eye")
@@ -343,7 +344,7 @@ class Tour:
     async def failed(self) -> AsyncIterator[str]:
         """Visit the screens after a run that failed, from the operator's screen."""
         page, words = self.screen.page, self.words
-        # Not by its name, which notices on this screen share in some languages.
+        # Do not search by name: in some languages, notices on this screen have the same name.
         dismiss = page.locator(".operator-dismiss")
         await dismiss.wait_for()
         yield "operator, failed run"

@@ -1,4 +1,4 @@
-"""An emulated tablet or headset with WebXR around the markers of the fake camera."""
+"""An emulated WebXR tablet or headset that sees the markers of the fake camera."""
 
 import asyncio
 import json
@@ -10,7 +10,7 @@ import numpy as np
 from playwright.async_api import Page
 from scipy.spatial.transform import Rotation
 
-from tests.editor.camera_video import Array, Lens, Shot, looking, picture_url
+from tests.editor.camera_video import Array, Lens, Shot, look_at, picture_url
 from tests.editor.screen import VIEWPORTS, Screen
 
 _HERE: Final = Path(__file__).parent
@@ -27,7 +27,7 @@ LENS: Final = Lens(
 )
 """The lens of the emulated camera, whose pictures fill the screen."""
 Point = tuple[float, float, float]
-SHOTS: Final = [looking(np.array(eye), LENS) for eye in ((0.15, -0.55, 0.6), (-0.2, -0.4, 0.7), (0.6, -0.5, 0.75))]
+SHOTS: Final = [look_at(np.array(eye), LENS) for eye in ((0.15, -0.55, 0.6), (-0.2, -0.4, 0.7), (0.6, -0.5, 0.75))]
 _PROJECTED: Final = """(points) => {
     const { view } = window.__engine, { left, top } = view.element.getBoundingClientRect();
     const { width, height } = window.__engine.shown();
@@ -48,7 +48,7 @@ _HAND_RAY: Final = """() => {
 
 
 async def emulate(page: Page, *, headset: bool = False, pictures: bool = True, overlay: bool = True) -> None:
-    """Let the page find a device with WebXR. Call it before the page is opened."""
+    """Emulate a WebXR device in the page. Call this before the page is opened."""
     options = {"headset": headset, "pictures": pictures, "overlay": overlay}
     await page.add_init_script(f"window.__xrOptions = {json.dumps(options)};")
     await page.add_init_script(_IWER.read_text())
@@ -68,23 +68,23 @@ def pose_of(shot: Shot) -> tuple[list[float], list[float]]:
     return in_xr(tuple(eye)).tolist(), (_UPRIGHT * turn * _FLIP).as_quat().tolist()
 
 
-async def place(screen: Screen, shot: Shot, picture: bool = True, off: Point = (0, 0, 0)) -> None:
-    """Put the device where a shot is taken, with its picture; `off`: error of the tracking, m."""
+async def place_device(screen: Screen, shot: Shot, picture: bool = True, off: Point = (0, 0, 0)) -> None:
+    """Put the device at the pose of a shot, and show it the picture. `off` is the tracking error, m."""
     position, turn = pose_of(shot)
     arguments = [(np.array(position) + off).tolist(), turn, picture_url(shot) if picture else None]
     await screen.page.evaluate("(given) => __xr.place(...given)", arguments)
 
 
 async def overlay_errors(screen: Screen, shot: Shot, points: list[Point]) -> list[float]:
-    """Return how far the 3D view puts points from where the device sees them, m at their distance."""
+    """Return the distance between the drawn and the true position of each point, m, measured at the point's depth."""
     shown = np.array(await screen.page.evaluate(_PROJECTED, points))
     true, depths = shot.project(points)
     errors: list[float] = (np.linalg.norm(shown - (true + 0.5), axis=1) * depths / shot.lens.focal).tolist()
     return errors
 
 
-async def until_fitting(screen: Screen, shot: Shot, points: list[Point], most: float) -> None:
-    """Wait until the overlay fits."""
+async def wait_for_overlay(screen: Screen, shot: Shot, points: list[Point], most: float) -> None:
+    """Wait until the overlay error is at most `most`, m."""
     worst = math.inf
     for _ in range(400):
         worst = max(await overlay_errors(screen, shot, points))
@@ -100,17 +100,17 @@ class Controller:
     def __init__(self, screen: Screen) -> None:
         self.screen = screen
 
-    async def _at(self, position: Any, turn: Rotation) -> None:
-        """Let the ray start at a position."""
-        await self._put(position, turn)
+    async def _set_ray(self, position: Any, turn: Rotation) -> None:
+        """Let the ray start at a position, with a direction."""
+        await self._set_pose(position, turn)
         if ray := await self.screen.page.evaluate(_HAND_RAY):
             # The ray of a hand does not start in its frame.
             seen = Rotation.from_matrix(np.reshape(ray, (4, 4)).T[:3, :3])
             shift = turn.inv().apply(np.subtract(ray[12:15], position))
             turned = turn * (turn.inv() * seen).inv()
-            await self._put(position - turned.apply(shift), turned)
+            await self._set_pose(position - turned.apply(shift), turned)
 
-    async def _put(self, position: Any, turn: Rotation) -> None:
+    async def _set_pose(self, position: Any, turn: Rotation) -> None:
         script = """([position, turn]) => {
             for (const each of [__xr.device.controllers.right, __xr.device.hands.right]) {
                 each.position.set(...position);
@@ -133,15 +133,15 @@ class Controller:
         )
 
     async def aim(self, at: Any, start: Any) -> None:
-        """Point from a position at another, both in the frame of WebXR."""
+        """Aim the ray from a position at another, both in the frame of WebXR."""
         ahead = np.asarray(at, float) - start
         ahead /= np.linalg.norm(ahead)
         turn, _ = Rotation.align_vectors([ahead], [[0, 0, -1]])
-        await self._at(start, turn)
+        await self._set_ray(start, turn)
 
     async def touch(self, at: Any) -> None:
         """Hold the tip at a position."""
-        await self._at(at, Rotation.identity())
+        await self._set_ray(at, Rotation.identity())
 
     async def button(self, name: str) -> None:
         """Point at a button of the panel."""
