@@ -1,4 +1,4 @@
-"""Tests of `arcor2-hw demo` as a process, and of the command line next to it."""
+"""Run `arcor2-hw demo` and other commands as processes."""
 
 import asyncio
 import signal
@@ -54,7 +54,7 @@ async def arcor2_hw(*words: str) -> tuple[int, str]:
 
 @asynccontextmanager
 async def demo(data_dir: Path, *arguments: str) -> AsyncIterator[Run]:
-    """A demo that runs at full speed, ended after the test."""
+    """Run a demo at full speed, and stop it at the end of the context."""
     command = [sys.executable, "-m", "arcor2_server.cli.main", "demo", "--fast", "--port", "0"]
     process = await asyncio.create_subprocess_exec(
         *command,

@@ -14,8 +14,8 @@ from arcor2_hw.kinematics.shapes import Box
 from arcor2_server.demo.workplace import Workplace, load
 from tests.kinematics.kin_robots import TWO_AXIS, ur
 
-APART = 0.04
-"""Least distance, m."""
+MIN_DISTANCE = 0.04
+"""Smallest allowed distance, m."""
 SEED = np.array((0.0, -1.4, 2.0, -2.2, -1.57, 0.0))
 STEPS = 12
 
@@ -35,7 +35,7 @@ def target(cell: Workplace, name: str) -> Pose:
     return Pose(position, Orientation.from_rotation_vector(*point.rotation))
 
 
-def between(joints: list[np.ndarray]) -> list[np.ndarray]:
+def interpolated(joints: list[np.ndarray]) -> list[np.ndarray]:
     return [one + (two - one) * t for one, two in pairwise(joints) for t in np.linspace(0.0, 1.0, STEPS)]
 
 
@@ -55,7 +55,7 @@ def robot_path(cell: Workplace) -> list[np.ndarray]:
     ):
         q = inverse.solve(origin @ (target(cell, name) * Pose(Position(0.0, 0.0, -back))).matrix(), q)
         found.append(q)
-    return between(found)
+    return interpolated(found)
 
 
 def press_path(cell: Workplace) -> list[np.ndarray]:
@@ -66,7 +66,7 @@ def press_path(cell: Workplace) -> list[np.ndarray]:
         x, y, _ = (origin @ target(cell, name).matrix())[:3, 3]
         options = [np.array(q) for q in two_axis_kinematics.inverse((0.15, 0.10), x, y)]
         found.append(min(options, key=lambda q: float(abs(q - found[-1]).max())) if found else options[0])
-    return between(found)[:: STEPS // 4]
+    return interpolated(found)[:: STEPS // 4]
 
 
 @pytest.fixture(scope="module")
@@ -74,8 +74,8 @@ def cell() -> Workplace:
     return load()
 
 
-def test_the_robot_passes_above_the_press(cell: Workplace) -> None:
-    world = CollisionWorld(APART)
+def test_robot_and_press_keep_their_distance(cell: Workplace) -> None:
+    world = CollisionWorld(MIN_DISTANCE)
     path, press = robot_path(cell), press_path(cell)
     world.add_robot("robot", ur(), base(cell, "robot"), path[0])
     world.add_robot("press", RobotModel.load(TWO_AXIS), base(cell, "press"), press[0])
@@ -84,8 +84,8 @@ def test_the_robot_passes_above_the_press(cell: Workplace) -> None:
         world.put(name, Box(*size), flange * Pose(Position(0.0, 0.0, at)))
         world.attach(name, "robot", "flange", touching=["gripper", "board"])
     touched = set()
-    for own in press:
-        world.set_joints("press", own)
+    for press_joints in press:
+        world.set_joints("press", press_joints)
         for q in path:
             touched |= {str(contact) for contact in world.contacts("robot", q) if "press" in str(contact)}
     assert touched == set()

@@ -7,7 +7,7 @@ from arcor2_hw.calibration.configuration import read_configuration
 from arcor2_server.demo.workplace import layout_file, markers_file
 
 
-def test_the_server_knows_the_markers_of_the_demo() -> None:
+def test_server_and_simulated_cell_have_the_same_markers() -> None:
     camera = msgspec.json.decode(layout_file().read_bytes(), type=Layout).camera
     assert camera is not None
     configuration = read_configuration(markers_file())

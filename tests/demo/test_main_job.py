@@ -1,4 +1,4 @@
-"""Tests of the demo's main program: five readings agree, and faults are reported. See test_books for random faults."""
+"""Tests of the demo's main program: all counts agree, and faults are reported. See test_parts_benchmark for kills."""
 
 import asyncio
 import io
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="module")
 BOARDS = 2
 SEEDS = iter(lambda: random.SystemRandom().randrange(1_000_000), None)
 SEED = next(seed for seed in SEEDS if draw_boards(BOARDS, seed)[0].defect is None)
-"""A random one whose first board is good, so that the second one is loaded while the first one gets its label."""
+"""A random seed whose first board is good, so that the second one is loaded while the first one gets its label."""
 GOOD = 3
 """A seed whose first board is good."""
 FIRST_VERSION = Path(__file__).parents[1] / "compatibility" / "recorded" / "demo-package.zip"
@@ -56,12 +56,12 @@ class Cell:
         async with Client(self.url, "operator") as client:
             await confirm_emptied(client)
 
-    async def program(
+    async def run_program(
         self, client: Client, at: dict[str, Callable[[], Awaitable[Any]]] | None = None, package_id: str = ""
     ) -> str:
         """Run a package, by default the newest; return its error, empty for none.
 
-        at: actions of the test when the program action of that name starts.
+        at: functions that the test calls when the program action of that name starts.
         """
         if not package_id:
             package_id = (await client.call("ListPackages"))[-1].id
@@ -113,7 +113,7 @@ async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Cell]:
         order: list[str] = []
         observer = asyncio.create_task(watch(at["url"], script, order))
         await until(
-            lambda: "The server runs at" in run.output or run.process.returncode is not None, "the cycle to end", 200
+            lambda: "The server runs at" in run.output or run.process.returncode is not None, "the cycle ends", 200
         )
         yield Cell(run, script, order)
         run.process.send_signal(signal.SIGINT)
@@ -122,7 +122,7 @@ async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Cell]:
         assert run.at() is None
 
 
-async def test_five_readings_agree(cell: Cell) -> None:
+async def test_counts_of_program_tester_simulation_and_planning_agree(cell: Cell) -> None:
     run, at = cell.run, cell.run.at()
     assert at is not None, run.output
     assert f"seed {SEED}" in run.output
@@ -197,13 +197,13 @@ async def test_the_tower_was_green_while_the_program_ran_and_is_red_after_it(cel
 
 
 # ---------------------------------------------------------------------------------------------------- faults
-async def test_a_board_that_is_not_read_and_a_planning_service_that_is_down(cell: Cell) -> None:
+async def test_an_unread_board_is_rejected_and_late_results_are_delivered(cell: Cell) -> None:
     command_fake = cell.run.command_fake
     async with Client(cell.url, "tests") as client:
         # The label of the board cannot be read: the board is rejected and reported, and the program goes on.
         await cell.renew()
         await command_fake("erp", "add_order", order="UNREAD", product="Controller board", quantity=1)
-        assert await cell.program(client, {"picture": lambda: command_fake("reader", "health", value="FAIL")}) == ""
+        assert await cell.run_program(client, {"picture": lambda: command_fake("reader", "health", value="FAIL")}) == ""
         await command_fake("reader", "health", value="OK")
         assert (await command_fake("world", "truth"))["counts"]["bad"] == 1
         (unread,) = [
@@ -226,7 +226,7 @@ async def test_a_board_that_is_not_read_and_a_planning_service_that_is_down(cell
             missing.append(sum(result["order"] == "AGAIN" for result in erp["results"]))
             await command_fake("erp", "heal")
 
-        assert await cell.program(client, {"bring": down, "all_sent": up}) == ""
+        assert await cell.run_program(client, {"bring": down, "all_sent": up}) == ""
     assert missing == [0]
     world, erp = await command_fake("world", "truth"), await command_fake("erp", "truth")
     assert world["counts"]["good"] == 1
@@ -239,10 +239,10 @@ async def test_a_package_of_the_first_version_runs_with_its_own_drivers(cell: Ce
     async with Client(cell.url, "tests") as client:
         newest = tmp_path / "newest.zip"
         await client.rest.download_package((await client.call("ListPackages"))[-1].id, newest)
-        await client.rest.upload_package("first-version", with_the_settings_of(FIRST_VERSION, newest))
+        await client.rest.upload_package("first-version", with_settings_of(FIRST_VERSION, newest))
         await cell.renew()
         await cell.run.command_fake("erp", "add_order", order="FIRST", product="Controller board", quantity=1)
-        assert await cell.program(client, package_id="first-version") == ""
+        assert await cell.run_program(client, package_id="first-version") == ""
         await client.call("DeletePackage", rpc.IdArgs("first-version"))
     world, erp = await cell.run.command_fake("world", "truth"), await cell.run.command_fake("erp", "truth")
     (board,) = world["boards"]
@@ -251,7 +251,7 @@ async def test_a_package_of_the_first_version_runs_with_its_own_drivers(cell: Ce
     assert reported == [(board["code"], True)]
 
 
-def with_the_settings_of(package: Path, other: Path) -> bytes:
+def with_settings_of(package: Path, other: Path) -> bytes:
     """Return a package whose objects have the settings, and thus the addresses, of those in another package."""
     with zipfile.ZipFile(other) as archive:
         scene = json.loads(archive.read("data/scene.json"))
@@ -273,7 +273,7 @@ async def test_once_prints_one_line_when_a_fault_ends_the_program(tmp_path: Path
     async with demo(tmp_path, "--once", "--boards", "1", "--seed", str(GOOD)) as run:
         await until(run.at, "the demo prints its addresses", 40)
         # No call of the belt is running: the message must name it nevertheless.
-        await until(lambda: "  board_there" in run.output, "the board to be waited for", 60)
+        await until(lambda: "  board_there" in run.output, "the program waits for the board", 60)
         await run.command_fake("belt", "emergency", code=0x2310)
         assert await asyncio.wait_for(run.process.wait(), 60) == 8, run.output
     last = run.output.strip().splitlines()[-1]

@@ -1,4 +1,4 @@
-"""The demo cell with random faults, kills included, and an operator who resolves each of them."""
+"""The demo cell with random faults, including killed processes, and an operator who resolves each fault."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ SEED = 4
 BOARDS, FAULTS = 4, 10
 
 
-@pytest.mark.matrix  # the faults one by one are in tests/e2e
+@pytest.mark.matrix  # tests/e2e tests each fault
 async def test_every_board_is_accounted_for_and_reported_once(tmp_path: Path) -> None:
     result = await trial(tmp_path / "cell", SEED, BOARDS, FAULTS)
     assert result.problems() == []

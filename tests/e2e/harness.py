@@ -1,4 +1,4 @@
-"""The whole workplace for tests: fakes, small world and server as processes, and helpers to control them."""
+"""The whole workplace for tests: fakes, simulated cell and server as processes, and helpers to control them."""
 
 import asyncio
 import contextlib
@@ -32,16 +32,16 @@ from tests.waiting import WITHIN
 WORKPLACE = Path(__file__).parent / "workplace" / "three_devices.toml"
 
 
-async def until(ask: Callable[[], Any], what: str, timeout: float = 30.0) -> Any:
+async def until(check: Callable[[], Any], condition: str, timeout: float = 30.0) -> Any:
     """Poll until the result is true, and return it. Fail with the name of the condition."""
-    began = own_time()
+    start = own_time()
     while True:
-        answer = ask()
+        answer = check()
         if asyncio.iscoroutine(answer):
             answer = await answer
         if answer:
             return answer
-        assert not began.is_past(timeout), f"not within {timeout} s: {what}"
+        assert not start.is_past(timeout), f"not within {timeout} s: {condition}"
         await asyncio.sleep(0.02)
 
 
@@ -181,7 +181,7 @@ class Cell:
         }
 
     async def open(self, client: Client, boards: int = 2, workplace: Workplace | None = None) -> tuple[Scene, Project]:
-        """Open the scene and project of the three devices; create them if they are missing."""
+        """Open the scene and project of the three devices; create missing ones."""
         creation = Creation(client, workplace or load(WORKPLACE), self.addresses())
         scene = await creation.open_scene()
         return scene, await creation.open_project(scene, {"boards": boards})
@@ -216,7 +216,7 @@ def kill(pid: int) -> None:
 
 @contextlib.asynccontextmanager
 async def running_cell(directory: Path, *, boards: int = 0, seed: int = 0) -> AsyncIterator[Cell]:
-    """Start all fakes and the server; with boards also the small world."""
+    """Start all fakes and the server. With boards, start the simulated cell, too."""
     cell = Cell(directory)
     try:
         async with asyncio.TaskGroup() as tasks:

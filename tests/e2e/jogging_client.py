@@ -1,4 +1,4 @@
-"""A client that holds a robot and renews every 50 ms: `python -m tests.e2e.jogging_client URL ROBOT_ID`."""
+"""A client that jogs a robot and renews its hold every 50 ms: `python -m tests.e2e.jogging_client URL ROBOT_ID`."""
 
 import asyncio
 import sys

@@ -34,7 +34,7 @@ def pose(of: Pose) -> dict[str, Any]:
     return {"position": list(of.position), "orientation": list(of.orientation)}
 
 
-def printed(number: int, x: float, y: float) -> dict[str, Any]:
+def paper_marker(number: int, x: float, y: float) -> dict[str, Any]:
     """Return a marker on paper in the fake camera's format. Its face is the plane of the origin."""
     return {
         "name": f"marker {number}",
@@ -45,18 +45,18 @@ def printed(number: int, x: float, y: float) -> dict[str, Any]:
     }
 
 
-def tilted(angle: float) -> Orientation:
+def rotated_about_z(angle: float) -> Orientation:
     return Orientation.from_rotation_vector(0.0, 0.0, angle)
 
 
-def off(found: Pose, truth: Pose) -> tuple[float, float]:
-    """Return the difference of two poses, mm and degrees."""
+def pose_error(found: Pose, truth: Pose) -> tuple[float, float]:
+    """Return the distance and the angle between two poses, mm and degrees."""
     return 1e3 * found.position.distance_to(truth.position), math.degrees(found.orientation.angle_to(truth.orientation))
 
 
-def in_view(*, markers: bool = True, robot: bool = True) -> list[dict[str, Any]]:
+def visible_things(*, markers: bool = True, robot: bool = True) -> list[dict[str, Any]]:
     """Return the objects of the workplace in the fake camera's format."""
-    things = [printed(number, *place) for number, place in MARKERS.items()] if markers else []
+    things = [paper_marker(number, *place) for number, place in MARKERS.items()] if markers else []
     if robot:
         things += arm.things("ur5e", ROBOT.matrix(), Q, np.eye(4)).values()
     return things

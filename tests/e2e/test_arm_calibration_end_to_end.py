@@ -44,7 +44,7 @@ def tip(deltas: Any = None) -> Position:
 
 
 @dataclass
-class Place:
+class Workplace:
     cell: Cell
     client: Client
     robot: str
@@ -56,8 +56,8 @@ class Place:
             found: dict[str, Any] = answer.json()
             return found
 
-    async def forward(self) -> Position:
-        """Return the tip's position as computed offline."""
+    async def offline_tip(self) -> Position:
+        """Return the tip's position at the joints Q as the server computes it offline."""
         names = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
         joints = [Joint(f"{name}_joint", value) for name, value in zip(names, Q, strict=True)]
         args = rpc.ForwardKinematicsArgs(self.robot, "tcp", joints)
@@ -84,7 +84,7 @@ class Place:
 
 
 @pytest_asyncio.fixture(loop_scope="module")
-async def place(tmp_path: Path) -> AsyncIterator[Place]:
+async def workplace(tmp_path: Path) -> AsyncIterator[Workplace]:
     """Start a server for each test, because one test ends it."""
     cell = Cell(tmp_path)
     try:
@@ -96,46 +96,46 @@ async def place(tmp_path: Path) -> AsyncIterator[Place]:
         parameters = [Parameter("host", "string", msgspec.json.encode(cell.robot_host).decode())]
         await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("arm", "UR5e", Pose(), parameters))
         robot = (await client.next_event("SceneObjectChanged", timeout=60)).data.id
-        yield Place(cell, client, robot)
+        yield Workplace(cell, client, robot)
     finally:
         await cell.stop()
 
 
 async def test_calibration_from_the_controller_is_used_offline_and_after_a_restart(
-    place: Place,
+    workplace: Workplace,
 ) -> None:
-    kinematics = await place.robot_kinematics()
+    kinematics = await workplace.robot_kinematics()
     assert (kinematics["in_force"], "read" in kinematics) == ("nominal", False)
-    assert (await place.forward()).distance_to(tip()) < 1e-6
+    assert (await workplace.offline_tip()).distance_to(tip()) < 1e-6
     assert tip().distance_to(tip(DELTAS)) > 1e-3, "the calibration must make a difference"
 
-    message = await place.go_online()
+    message = await workplace.go_online()
     assert message.startswith("arm: The calibration in the controller is now used")
-    kinematics = await place.robot_kinematics()
+    kinematics = await workplace.robot_kinematics()
     assert kinematics["in_force"] == "measured"
     assert len(kinematics["checksum"].split("-")) == 6
     assert kinematics["read"]
-    assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
+    assert (await workplace.offline_tip()).distance_to(tip(DELTAS)) < 1e-6
 
-    await place.client.call("SaveScene")
-    port = int(place.cell.url.rpartition(":")[2].rstrip("/"))
-    await place.cell.kill("server")
-    await place.cell.start_server(port)
-    place.client = await place.cell.client("bob")
-    assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
+    await workplace.client.call("SaveScene")
+    port = int(workplace.cell.url.rpartition(":")[2].rstrip("/"))
+    await workplace.cell.kill("server")
+    await workplace.cell.start_server(port)
+    workplace.client = await workplace.cell.client("bob")
+    assert (await workplace.offline_tip()).distance_to(tip(DELTAS)) < 1e-6
 
-    # A robot with another address does not get the calibration.
-    await place.set_host("127.99.0.7")
-    assert (await place.robot_kinematics())["in_force"] == "nominal"
-    assert (await place.forward()).distance_to(tip()) < 1e-6
-    await place.set_host(place.cell.robot_host)
-    assert (await place.robot_kinematics())["in_force"] == "measured"
+    # The calibration is not used for a robot with another address.
+    await workplace.set_host("127.99.0.7")
+    assert (await workplace.robot_kinematics())["in_force"] == "nominal"
+    assert (await workplace.offline_tip()).distance_to(tip()) < 1e-6
+    await workplace.set_host(workplace.cell.robot_host)
+    assert (await workplace.robot_kinematics())["in_force"] == "measured"
 
 
-async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place: Place) -> None:
-    client, robot = place.client, place.robot
-    await place.set_host(place.cell.robot_host, Parameter("payload_mass", "double", "0.0"))
-    await place.cell.command_fake("robot", "place", q=[0.4, -1.3, 1.5, -1.77, -1.57, 0.3])
+async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(workplace: Workplace) -> None:
+    client, robot = workplace.client, workplace.robot
+    await workplace.set_host(workplace.cell.robot_host, Parameter("payload_mass", "double", "0.0"))
+    await workplace.cell.command_fake("robot", "place", q=[0.4, -1.3, 1.5, -1.77, -1.57, 0.3])
     await client.call("StartScene")
     await scene_state(client, SceneStateEnum.STARTED)
     tip = await client.get_end_effector_pose(robot_id=robot, end_effector_id="tcp")
@@ -154,7 +154,7 @@ async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place:
             pass
         return motion.message if motion.move_event_type == "failed" else ""
 
-    async with httpx.AsyncClient(timeout=60, base_url=place.cell.url.replace("ws", "http", 1)) as http:
+    async with httpx.AsyncClient(timeout=60, base_url=workplace.cell.url.replace("ws", "http", 1)) as http:
 
         async def put(key: str, at: Position, x: float, y: float, z: float) -> None:
             size = {"boxId": key, "sizeX": x, "sizeY": y, "sizeZ": z}
@@ -166,41 +166,41 @@ async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place:
         await put("crate", tip.position, 0.1, 0.1, 0.1)
         assert "crate" in await line(back)
         assert (await http.delete("/collisions/crate")).status_code == 200
-        # The rod in its gripper would touch a table, which the arm alone does not.
+        # The gripped rod would touch the table. The robot without the rod does not.
         await put("table", tip.position - Position(0.0, 0.0, 0.27), 0.4, 0.4, 0.02)
         assert await line(back) == ""
         assert await line(up) == ""
         await put("rod", tip.position + up - Position(0.0, 0.0, 0.15), 0.03, 0.03, 0.26)
         answer = await http.put("/collisions/rod/attach", params={"robotId": robot, "link": "tcp"})
         assert answer.status_code == 200, answer.text
-        met = await line(back)
-        assert "rod" in met
-        assert "table" in met
+        refusal = await line(back)
+        assert "rod" in refusal
+        assert "table" in refusal
         assert await line(up + Position(0.0, 0.05, 0.0)) == "", "the gripped rod is not an obstacle for its own robot"
         assert (await http.delete("/collisions/rod")).status_code == 200
         assert await line(back) == ""
-    await place.go_offline()
+    await workplace.go_offline()
 
 
-async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
-    await place.go_online()
-    assert (await place.robot_kinematics())["in_force"] == "measured"
-    await place.cell.command_fake("robot", "calibration", deltas=DELTAS.tolist(), reported=False)
-    message = await place.go_online()
+async def test_calibration_of_another_arm_is_not_used(workplace: Workplace) -> None:
+    await workplace.go_online()
+    assert (await workplace.robot_kinematics())["in_force"] == "measured"
+    await workplace.cell.command_fake("robot", "calibration", deltas=DELTAS.tolist(), reported=False)
+    message = await workplace.go_online()
     assert "The calibration cannot be read from the controller. The stored one is used." in message
-    assert place.cell.robot_host in message
-    assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
+    assert workplace.cell.robot_host in message
+    assert (await workplace.offline_tip()).distance_to(tip(DELTAS)) < 1e-6
 
     strange = DELTAS.copy()
     strange[2, 0] += 0.2
-    await place.cell.command_fake("robot", "calibration", deltas=strange.tolist())
-    message = await place.go_online()
+    await workplace.cell.command_fake("robot", "calibration", deltas=strange.tolist())
+    message = await workplace.go_online()
     assert "arm: The calibration in the controller cannot be used. Kinematics are nominal." in message
-    kinematics = await place.robot_kinematics()
+    kinematics = await workplace.robot_kinematics()
     assert kinematics["in_force"] == "nominal"
     assert "50 mm" in kinematics["refused"]
-    assert (await place.forward()).distance_to(tip()) < 1e-6
+    assert (await workplace.offline_tip()).distance_to(tip()) < 1e-6
 
-    await place.cell.command_fake("robot", "calibration", deltas=DELTAS.tolist())
-    await place.go_online()
-    assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
+    await workplace.cell.command_fake("robot", "calibration", deltas=DELTAS.tolist())
+    await workplace.go_online()
+    assert (await workplace.offline_tip()).distance_to(tip(DELTAS)) < 1e-6

@@ -1,4 +1,4 @@
-"""A server with a fake camera and robot calibrates their poses, and refuses to if the markers or the arm are hidden."""
+"""A server with a fake camera and robot calibrates their poses, and refuses if the markers or the arm are hidden."""
 
 import asyncio
 import contextlib
@@ -22,7 +22,7 @@ from arcor2_server.cli.main import app
 from arcor2_server.demo.fakes import free_loopback_address
 from tests import forked_children
 from tests.e2e.harness import scene_state, until
-from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, in_view, off, pose, tilted
+from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, pose, pose_error, rotated_about_z, visible_things
 from tests.fakes.conftest import FakeProcess
 from tests.server.core.serving import ServerProcess
 
@@ -50,7 +50,7 @@ class World:
         client = self.client = await self._exit.enter_async_context(Client(self.server.url, "alice", reconnect=False))
         await client.new_scene("scene")
         near = Pose(CAMERA.position + Position(0.1, -0.05, 0.08), CAMERA.orientation)
-        wrong = Pose(ROBOT.position + Position(0.02, -0.015, 0.01), ROBOT.orientation * tilted(0.03))
+        wrong = Pose(ROBOT.position + Position(0.02, -0.015, 0.01), ROBOT.orientation * rotated_about_z(0.03))
         await client.add_object_to_scene(
             name="cam",
             type="OakD",
@@ -77,7 +77,7 @@ class World:
 
     def show(self, *, markers: bool = True, robot: bool = True) -> None:
         """Send the objects of the workplace to the fake camera."""
-        self.camera.control.do("scene", things=in_view(markers=markers, robot=robot))
+        self.camera.control.do("scene", things=visible_things(markers=markers, robot=robot))
         self.camera.control.do("camera", pose=pose(CAMERA))
 
     async def configure_markers(self) -> None:
@@ -90,7 +90,7 @@ class World:
         await self._exit.aclose()
 
     @contextlib.asynccontextmanager
-    async def holding(self, name: str) -> AsyncIterator[None]:
+    async def locked(self, name: str) -> AsyncIterator[None]:
         """Hold the lock of an object in this context."""
         await self.client.write_lock(self.ids[name])
         try:
@@ -98,7 +98,7 @@ class World:
         finally:
             await self.client.write_unlock(self.ids[name])
 
-    async def calibrated(self, name: str, **more: Any) -> tuple[str, str]:
+    async def calibrate(self, name: str, **more: Any) -> tuple[str, str]:
         """Calibrate; return the last state of the process and its message."""
         if name == "cam":
             await self.client.calibrate_camera(self.ids["cam"])
@@ -109,7 +109,7 @@ class World:
             if event.data.state != "started":
                 return event.data.state, event.data.message
 
-    async def placed(self, name: str) -> Pose:
+    async def stored_pose(self, name: str) -> Pose:
         async with Client(self.server.url) as other:
             scene = (await other.next_event("OpenScene")).data.scene
         (found,) = [obj.pose for obj in scene.objects if obj.name == name]
@@ -125,23 +125,23 @@ def setting(name: str, value: str | float) -> Parameter:
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def world(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[World]:
-    made = World(tmp_path_factory.mktemp("calibration"))
+    running = World(tmp_path_factory.mktemp("calibration"))
     try:
-        await made.start()
-        yield made
+        await running.start()
+        yield running
     finally:
-        await made.stop()
+        await running.stop()
 
 
 async def test_camera_pose_is_calibrated_from_markers(world: World) -> None:
-    async with world.holding("cam"):
-        state, message = await world.calibrated("cam")
+    async with world.locked("cam"):
+        state, message = await world.calibrate("cam")
         assert state == "failed"
         assert "No markers are configured" in message
         await world.configure_markers()
-        state, message = await world.calibrated("cam")
+        state, message = await world.calibrate("cam")
         assert state == "finished", message
-        millimetres, degrees = off(await world.placed("cam"), CAMERA)
+        millimetres, degrees = pose_error(await world.stored_pose("cam"), CAMERA)
         assert millimetres < 3.0
         assert degrees < 0.2
         (record, *_) = (await world.http.get("/api/calibrations", params={"object_id": world.ids["cam"]})).json()
@@ -150,12 +150,12 @@ async def test_camera_pose_is_calibrated_from_markers(world: World) -> None:
 
 
 async def test_robot_pose_is_calibrated_from_depth(world: World) -> None:
-    async with world.holding("arm"):
-        before = off(await world.placed("arm"), ROBOT)
+    async with world.locked("arm"):
+        before = pose_error(await world.stored_pose("arm"), ROBOT)
         assert before[0] > 20.0
-        state, message = await world.calibrated("arm")
+        state, message = await world.calibrate("arm")
         assert state == "finished", message
-        millimetres, degrees = off(await world.placed("arm"), ROBOT)
+        millimetres, degrees = pose_error(await world.stored_pose("arm"), ROBOT)
         assert millimetres < 2.5
         assert degrees < 0.2
         assert message.startswith("arm is ")
@@ -164,30 +164,30 @@ async def test_robot_pose_is_calibrated_from_depth(world: World) -> None:
         assert record["parameters"]["camera_name"] == "cam"
 
 
-async def test_hidden_cameras_and_robots_are_refused(world: World) -> None:
+async def test_calibration_is_refused_if_markers_or_robot_are_hidden(world: World) -> None:
     await world.configure_markers()
     for name, hidden, words in (
         ("cam", {"markers": False}, "No configured marker"),
         ("arm", {"robot": False}, "robot"),
     ):
-        async with world.holding(name):
-            before = await world.placed(name)
+        async with world.locked(name):
+            before = await world.stored_pose(name)
             records = (await world.http.get("/api/calibrations")).json()
             world.show(**hidden)
             await asyncio.sleep(0.5)  # a picture taken earlier may still arrive
             try:
-                state, message = await world.calibrated(name)
+                state, message = await world.calibrate(name)
             finally:
                 world.show()
             assert state == "failed", message
             assert words in message
-            assert await world.placed(name) == before
+            assert await world.stored_pose(name) == before
             assert (await world.http.get("/api/calibrations")).json() == records
 
 
 async def test_a_killed_worker_fails_only_the_running_calibration(world: World) -> None:
     client = world.client
-    async with world.holding("arm"):
+    async with world.locked("arm"):
         for worker in world.workers():
             worker.kill()
         await client.calibrate_robot(world.ids["arm"], move_to_calibration_pose=False)
@@ -202,8 +202,8 @@ async def test_a_killed_worker_fails_only_the_running_calibration(world: World) 
         assert event.data.state == "failed"
         assert "compute worker was killed by SIGKILL while it worked on the pose of a robot" in event.data.message
     # The next calibration uses another worker.
-    async with world.holding("cam"):
-        state, message = await world.calibrated("cam")
+    async with world.locked("cam"):
+        state, message = await world.calibrate("cam")
         assert state == "finished", message
 
 
@@ -215,27 +215,27 @@ async def test_a_gripped_part_is_an_obstacle_at_the_robots_pose(world: World) ->
     size = {"boxId": "part", "sizeX": 0.04, "sizeY": 0.04, "sizeZ": 0.04}
     assert (await http.put("/collisions/box", params=size, json=part)).status_code == 200
 
-    async def met(at: Position) -> Any:
+    async def check_line(at: Position) -> Any:
         ends = {"pt1": msgspec.to_builtins(at + Position(0, 0, 0.5)), "pt2": msgspec.to_builtins(at)}
         return (await http.put("/utils/line-safe", json=ends)).json()
 
-    assert await met(tip.position) == {"safe": False, "object_id": "part"}
+    assert await check_line(tip.position) == {"safe": False, "object_id": "part"}
     holder = {"robotId": arm_id, "link": "tcp"}
     answer = await http.put("/collisions/part/attach", params=holder)
     assert answer.status_code == 200, answer.text
     assert (await http.put("/collisions/part/attach", params=holder)).status_code == 409
-    assert await met(tip.position) == {"safe": False, "object_id": "part"}
+    assert await check_line(tip.position) == {"safe": False, "object_id": "part"}
     world.robot.control.do("place", q=[joints[0].value + 0.6, *(joint.value for joint in joints[1:])])
     moved = await until(lambda: _moved(world, tip), "the arm is at another position")
-    assert await met(tip.position) == {"safe": True}
-    assert await met(moved.position) == {"safe": False, "object_id": "part"}
+    assert await check_line(tip.position) == {"safe": True}
+    assert await check_line(moved.position) == {"safe": False, "object_id": "part"}
     answer = await http.put("/collisions/part/detach")
     assert answer.status_code == 200, answer.text
-    stays = msgspec.convert(answer.json(), Pose)
-    assert stays.position.distance_to(moved.position) < 0.005
+    released = msgspec.convert(answer.json(), Pose)
+    assert released.position.distance_to(moved.position) < 0.005
     world.robot.control.do("place", q=Q)
     await until(lambda: _moved(world, moved), "the arm has returned")
-    assert await met(moved.position) == {"safe": False, "object_id": "part"}
+    assert await check_line(moved.position) == {"safe": False, "object_id": "part"}
     assert (await http.put("/collisions/part/detach")).status_code == 409
     assert (await http.delete("/collisions/part")).status_code == 200
 
@@ -245,7 +245,9 @@ async def _moved(world: World, before: Pose) -> Pose | None:
     return now if now.position.distance_to(before.position) > 0.1 else None
 
 
-async def test_the_command_line_shows_the_progress(world: World, capsys: pytest.CaptureFixture[str]) -> None:
+async def test_the_command_line_calibrates_and_lists_the_records(
+    world: World, capsys: pytest.CaptureFixture[str]
+) -> None:
     arguments = ["calibrate", "online", "camera", "cam", "--url", world.server.url]
     status = await asyncio.to_thread(app, arguments)
     printed = capsys.readouterr()

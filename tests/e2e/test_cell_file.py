@@ -1,4 +1,4 @@
-"""Connection losses as clients see them, online and in a program; and one project with another device address."""
+"""Clients see connection losses, online and in a program. A cell file gives a device another address."""
 
 import asyncio
 import contextlib
@@ -22,7 +22,7 @@ from arcor2_hw.data.project import ActionParameter, Flow
 from tests.fakes.conftest import FakeProcess
 from tests.server.core.serving import running
 
-NOBODY = "socket://127.0.0.1:9"
+UNUSED_PORT = "socket://127.0.0.1:9"
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def scale() -> Iterator[FakeProcess]:
 
 
 @pytest.fixture(autouse=True)
-def whole(scale: FakeProcess) -> Iterator[None]:
+def healed_scale(scale: FakeProcess) -> Iterator[None]:
     yield
     scale.control.do("heal")
 
@@ -58,7 +58,7 @@ class Bench:
                 if event.event == "ObjectState":
                     self.states.append(event.data)
 
-    async def make(self, port: str) -> None:
+    async def create_project(self, port: str) -> None:
         call = self.client.call
         await call("NewScene", rpc.NewSceneArgs("bench"))
         settings = [Parameter("port", "string", f'"{port}"')]
@@ -114,9 +114,9 @@ class Bench:
 @contextlib.asynccontextmanager
 async def bench(tmp_path: Path, port: str, *arguments: str) -> AsyncIterator[Bench]:
     async with running(tmp_path / "data", *arguments) as server, Client(server.url, "ann") as client:
-        made = Bench(client, server.url)
-        await made.make(port)
-        yield made
+        created = Bench(client, server.url)
+        await created.create_project(port)
+        yield created
 
 
 C = Connection
@@ -124,41 +124,41 @@ UP = (C.CONNECTING, C.ONLINE)
 
 
 async def test_a_device_lost_online_refuses_its_actions(tmp_path: Path, scale: FakeProcess) -> None:
-    async with bench(tmp_path, scale.ready["port"]) as on:
-        assert await on.start() == ""
-        await on.state(C.CONNECTING)
-        await on.state(C.ONLINE)
-        async with Client(on.url, "late") as late:
+    async with bench(tmp_path, scale.ready["port"]) as workbench:
+        assert await workbench.start() == ""
+        await workbench.state(C.CONNECTING)
+        await workbench.state(C.ONLINE)
+        async with Client(workbench.url, "late") as late:
             await late.call("SubscribeEvents", rpc.SubscribeEventsArgs({"ObjectState"}))
             assert (await late.next_event("ObjectState")).data.state is C.ONLINE, (
                 "a client that connects late receives the state"
             )
 
         scale.control.do("silence")
-        lost = await on.state(C.LOST)
+        lost = await workbench.state(C.LOST)
         assert not isinstance(lost.reason, Unset)
         assert "balance" in lost.reason
-        (status,) = await on.devices()
+        (status,) = await workbench.devices()
         assert (status["connection"], status["reason"]) == ("lost", lost.reason)
-        refused = await on.execute()
+        refused = await workbench.execute()
         assert "balance" in refused.error
         assert "lost" in refused.error
 
         scale.control.do("heal")
-        await on.state(C.BACK, C.ONLINE)  # the loss is reported only once
-        assert (await on.execute()).results, "the scene continued, and the device is connected again"
-        await on.stop()
-        await on.state(C.ONLINE, C.OFFLINE)
-        assert C.LOST not in [data.state for data in on.states]
+        await workbench.state(C.BACK, C.ONLINE)  # the loss is reported only once
+        assert (await workbench.execute()).results, "the scene continued, and the device is connected again"
+        await workbench.stop()
+        await workbench.state(C.ONLINE, C.OFFLINE)
+        assert C.LOST not in [data.state for data in workbench.states]
 
 
-async def test_clients_without_subscription_get_no_events(tmp_path: Path, scale: FakeProcess) -> None:
-    async with bench(tmp_path, scale.ready["port"]) as on, Client(on.url, "old") as old:
-        assert await on.start() == ""
-        await on.state(C.CONNECTING)
-        await on.state(C.ONLINE)
-        await on.stop()
-        await on.state(C.OFFLINE)
+async def test_clients_without_subscription_receive_no_object_states(tmp_path: Path, scale: FakeProcess) -> None:
+    async with bench(tmp_path, scale.ready["port"]) as workbench, Client(workbench.url, "old") as old:
+        assert await workbench.start() == ""
+        await workbench.state(C.CONNECTING)
+        await workbench.state(C.ONLINE)
+        await workbench.stop()
+        await workbench.state(C.OFFLINE)
         names = set()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(0.3):
@@ -171,9 +171,9 @@ async def test_clients_without_subscription_get_no_events(tmp_path: Path, scale:
 
 
 async def test_a_program_stops_and_names_the_lost_device(tmp_path: Path, scale: FakeProcess) -> None:
-    async with bench(tmp_path, scale.ready["port"]) as on:
-        call = on.client.call
-        built = await call("BuildProject", rpc.BuildProjectArgs(on.project, "weighing"))
+    async with bench(tmp_path, scale.ready["port"]) as workbench:
+        call = workbench.client.call
+        built = await call("BuildProject", rpc.BuildProjectArgs(workbench.project, "weighing"))
         await call("CloseProject")
         script = tmp_path / "data" / "packages" / built.package_id / "script.py"
         # The connection is lost while the program is busy with something else.
@@ -181,22 +181,22 @@ async def test_a_program_stops_and_names_the_lost_device(tmp_path: Path, scale: 
             script.read_text().replace("while True:", "import time\n    while True:\n        time.sleep(60)")
         )
         await call("RunPackage", rpc.RunPackageArgs(built.package_id))
-        while (await on.client.next_event("PackageState")).data.state is not PackageStateEnum.RUNNING:
+        while (await workbench.client.next_event("PackageState")).data.state is not PackageStateEnum.RUNNING:
             pass
         scale.control.do("silence")
         states: list[Connection] = []
-        why = ""
+        reason = ""
         async with asyncio.timeout(20):
-            async for event in on.client.events():
+            async for event in workbench.client.events():
                 if event.event == "ObjectState":
                     states.append(event.data.state)
                 elif event.event == "ProjectException":
-                    assert why == "", "reported once"
-                    why = event.data.message
+                    assert reason == "", "reported twice"
+                    reason = event.data.message
                 elif event.event == "PackageState" and event.data.state is PackageStateEnum.STOPPED:
                     break
-        assert "balance: the program was stopped, because the connection is lost: balance at " in why
-        assert "did not answer" in why
+        assert "balance: the program was stopped, because the connection is lost: balance at " in reason
+        assert "did not answer" in reason
         assert states[-2:] == [C.LOST, C.OFFLINE]
 
 
@@ -204,36 +204,36 @@ async def test_a_project_runs_with_a_device_at_another_address(tmp_path: Path, s
     file = tmp_path / "cell.yaml"
     devices = [
         CellDevice("balance", "MtSicsScale", {"port": scale.ready["port"]}),
-        CellDevice("elsewhere", "MtSicsScale", {"port": NOBODY}),
+        CellDevice("elsewhere", "MtSicsScale", {"port": UNUSED_PORT}),
     ]
     file.write_bytes(write_cell(Cell(devices)))
-    async with bench(tmp_path, NOBODY, "--cell", str(file)) as on:
-        assert await on.start() == "", "the address in the scene does not exist"
-        assert (await on.state(*UP)).overlaid == ["port"]
-        (status,) = await on.devices()
+    async with bench(tmp_path, UNUSED_PORT, "--cell", str(file)) as workbench:
+        assert await workbench.start() == "", "the address in the scene does not exist"
+        assert (await workbench.state(*UP)).overlaid == ["port"]
+        (status,) = await workbench.devices()
         assert status["overlaid"] == ["port"]
-        assert (await on.execute()).results
-        await on.stop()
-        call = on.client.call
-        built = await call("BuildProject", rpc.BuildProjectArgs(on.project, "weighing"))
+        assert (await workbench.execute()).results
+        await workbench.stop()
+        call = workbench.client.call
+        built = await call("BuildProject", rpc.BuildProjectArgs(workbench.project, "weighing"))
         await call("CloseProject")
         await call("RunPackage", rpc.RunPackageArgs(built.package_id))
-        assert (await on.client.next_event("ActionStateAfter")).data.action_id == on.weigh
+        assert (await workbench.client.next_event("ActionStateAfter")).data.action_id == workbench.weigh
         await call("StopPackage")
-        while (await on.client.next_event("PackageState")).data.state is not PackageStateEnum.STOPPED:
+        while (await workbench.client.next_event("PackageState")).data.state is not PackageStateEnum.STOPPED:
             pass
     log = (tmp_path / "data.log").read_text()
     assert "cell file overrides settings" in log
     assert scale.ready["port"] in log
-    assert "elsewhere" in log, "a name that is not in the scene may be misspelt"
+    assert "elsewhere" in log, "a device name that is not in the scene must be logged"
 
 
 async def test_a_device_of_another_type_is_not_started(tmp_path: Path) -> None:
     file = tmp_path / "cell.yaml"
-    file.write_bytes(write_cell(Cell([CellDevice("balance", "ZplPrinter", {"port": NOBODY})])))
-    async with bench(tmp_path, NOBODY, "--cell", str(file)) as on:
-        why = await on.start()
-        assert "balance is a MtSicsScale in the scene bench and a ZplPrinter in the cell file" in why
+    file.write_bytes(write_cell(Cell([CellDevice("balance", "ZplPrinter", {"port": UNUSED_PORT})])))
+    async with bench(tmp_path, UNUSED_PORT, "--cell", str(file)) as workbench:
+        reason = await workbench.start()
+        assert "balance is a MtSicsScale in the scene bench and a ZplPrinter in the cell file" in reason
 
 
 @pytest.mark.parametrize(

@@ -27,15 +27,15 @@ from tests.drivers.universal_robots.conftest import FakeUr
 from tests.e2e.harness import until
 from tests.server.core.serving import ServerProcess, running
 
-RESTS_WITHIN = 5.0
+STOP_TIMEOUT = 5.0
 """Time limit for standstill, s. Without a stop the arm would move for about 20 s. Benchmarks measure the time."""
 ATTEMPTS = 5
-SLOWLY_UP = Position(0.0, 0.0, 0.05)
+UP_SLOWLY = Position(0.0, 0.0, 0.05)
 LATE = re.compile("not renewed in time|ms late|had expired|has ended|is ending|still stopping")
 """Answers to a client that renews too late."""
 FAST = 0.2
 """Speed of the TCP that a motion at the speed limit exceeds, m/s."""
-SETTLED = 0.4
+STANDSTILL_TIME = 0.4
 """Time for which an arm must stay stopped, s."""
 
 
@@ -62,7 +62,7 @@ class Site:
         self.robot = ""
         self.hold = 0
         self.held: RobotHoldData | None = None
-        """Return the latest state of a hold."""
+        """Latest state of a hold."""
 
     async def start(self) -> None:
         await self.client.call("NewScene", rpc.NewSceneArgs("scene"))
@@ -79,29 +79,29 @@ class Site:
             if event.event == "RobotHold":
                 self.held = event.data
 
-    def moving(self) -> bool:
+    def is_moving(self) -> bool:
         return max(map(abs, self.fake.truth()["qd"])) > 1e-3
 
-    async def rests(self, since: Instant) -> None:
+    async def assert_stops(self, since: Instant) -> None:
         """Assert that the arm stops in time, and stays stopped."""
-        while self.moving():
-            assert not since.is_past(RESTS_WITHIN), f"it still moves after {RESTS_WITHIN:g} s"
+        while self.is_moving():
+            assert not since.is_past(STOP_TIMEOUT), f"the arm still moves after {STOP_TIMEOUT:g} s"
             await asyncio.sleep(0.005)
-        await self.stays()
+        await self.assert_standstill()
 
-    async def stays(self) -> None:
+    async def assert_standstill(self) -> None:
         at = self.fake.truth()["q"]
-        end = time.monotonic() + SETTLED
+        end = time.monotonic() + STANDSTILL_TIME
         while time.monotonic() < end:
-            assert not self.moving()
+            assert not self.is_moving()
             await asyncio.sleep(0.02)
         assert self.fake.truth()["q"] == pytest.approx(at, abs=1e-4)
 
-    async def is_refused(self, jogger: "Jogger", since: float) -> None:
-        """Assert that the client continues, but everything it sends from a moment on is refused and moves nothing."""
+    async def assert_refused(self, jogger: "Jogger", since: float) -> None:
+        """Assert that the server refuses all requests of the client after `since`, and that the arm does not move."""
         await until(lambda: len(jogger.answers(since)) > 5, "the client continues")
         assert all("refused" in answer for answer in jogger.answers(since)), jogger.answers(since)
-        await self.stays()
+        await self.assert_standstill()
 
     def host(self) -> int:
         """Return the cell host that holds the arm."""
@@ -120,9 +120,9 @@ class Site:
         await self.client.hold_hand_teaching(robot_id=self.robot, hold=self.hold, sent_ms=sent_ms, valid_ms=300)
 
     @contextlib.asynccontextmanager
-    async def holding(self, renew: Callable[[], Awaitable[Any]]) -> AsyncIterator["Held"]:
+    async def holding(self, renew: Callable[[], Awaitable[Any]]) -> AsyncIterator["Hold"]:
         """Hold the button in this context, then release it. If a busy machine renews too late, press again."""
-        held = Held()
+        held = Hold()
 
         async def renewed() -> None:
             press = self.hold
@@ -136,7 +136,7 @@ class Site:
 
         async def renewing() -> None:
             async with asyncio.TaskGroup() as renewals:
-                while not held.over and not held.refusal:
+                while not held.released and not held.refusal:
                     renewals.create_task(renewed())
                     await asyncio.sleep(0.05)
 
@@ -145,21 +145,21 @@ class Site:
         try:
             yield held
         finally:
-            held.over = True
+            held.released = True
             await task
 
 
-class Held:
+class Hold:
     """Answers of the server while the button is held, and the reason if the hold is refused."""
 
     def __init__(self) -> None:
-        self.over = False
+        self.released = False
         self.answers: list[Any] = []
         self.refusal = ""
 
 
 @contextlib.asynccontextmanager
-async def site(fake: FakeUr, directory: Path) -> AsyncIterator[Site]:
+async def running_site(fake: FakeUr, directory: Path) -> AsyncIterator[Site]:
     async with running(directory / "data") as server:
         client = Client(server.url, "watcher", reconnect=False)
         async with client:
@@ -190,9 +190,9 @@ class Jogger:
         answers = [line.split(maxsplit=1) for line in self.lines]
         return [answer for sent, answer in answers if float(sent) > since]
 
-    async def answered(self, place: Site) -> None:
-        """Return whether the arm moves or can no longer start."""
-        await until(lambda: place.moving() or any("refused" in one for one in self.answers()), "an answer")
+    async def wait_for_answer(self, site: Site) -> None:
+        """Wait until the arm moves or a request is refused."""
+        await until(lambda: site.is_moving() or any("refused" in one for one in self.answers()), "an answer")
 
     async def end(self) -> None:
         with contextlib.suppress(ProcessLookupError):
@@ -201,23 +201,23 @@ class Jogger:
         await self._listening
 
 
-async def _jogger(place: Site) -> Jogger:
+async def _jogger(site: Site) -> Jogger:
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "tests.e2e.jogging_client", place.server.url, place.robot),
+        *(sys.executable, "-m", "tests.e2e.jogging_client", site.server.url, site.robot),
         stdout=asyncio.subprocess.PIPE,
     )
     return Jogger(process)
 
 
 @contextlib.asynccontextmanager
-async def jogging(place: Site) -> AsyncIterator[Jogger]:
+async def jogging(site: Site) -> AsyncIterator[Jogger]:
     """Start a client that moves the arm; on a machine so busy that it renews too late, start another one."""
     for _ in range(ATTEMPTS):
-        jogger = await _jogger(place)
+        jogger = await _jogger(site)
         try:
-            await jogger.answered(place)
+            await jogger.wait_for_answer(site)
             await asyncio.sleep(0.3)
-            if place.moving() and place.held is not None and place.held.held:
+            if site.is_moving() and site.held is not None and site.held.held:
                 yield jogger
                 return
         finally:
@@ -226,72 +226,72 @@ async def jogging(place: Site) -> AsyncIterator[Jogger]:
 
 
 async def _freeze(pid: int) -> float:
-    """Suspend a process; return the time from which on it is suspended."""
+    """Suspend a process. Return the monotonic time at which it was suspended, s."""
     os.kill(pid, signal.SIGSTOP)
     await until(lambda: psutil.Process(pid).status() == psutil.STATUS_STOPPED, "the process is suspended")
     return time.monotonic()
 
 
 async def test_the_arm_stops_when_any_process_freezes_or_dies(fake: FakeUr, tmp_path: Path) -> None:
-    async with site(fake, tmp_path) as place:
-        await _a_client_that_freezes(place)
-        await _a_server_that_freezes(place)
-        await _a_host_that_freezes(place)
-        async with jogging(place):
-            began = own_time()
-            place.server.process.kill()
-            await place.rests(began)
+    async with running_site(fake, tmp_path) as site:
+        await _check_frozen_client(site)
+        await _check_frozen_server(site)
+        await _check_frozen_host(site)
+        async with jogging(site):
+            start = own_time()
+            site.server.process.kill()
+            await site.assert_stops(start)
 
 
-async def _a_client_that_freezes(place: Site) -> None:
-    async with jogging(place) as jogger:
-        began = own_time()
+async def _check_frozen_client(site: Site) -> None:
+    async with jogging(site) as jogger:
+        start = own_time()
         frozen = await _freeze(jogger.process.pid)
-        await place.rests(began)
-        await until(lambda: place.held is not None and not place.held.held, "the end of the hold")
-        assert place.held is not None
-        assert "not renewed in time" in place.held.reason
-        jogger.process.send_signal(signal.SIGCONT)  # it continues as if nothing had happened
-        await place.is_refused(jogger, frozen)
+        await site.assert_stops(start)
+        await until(lambda: site.held is not None and not site.held.held, "the end of the hold")
+        assert site.held is not None
+        assert "not renewed in time" in site.held.reason
+        jogger.process.send_signal(signal.SIGCONT)  # the client continues to send requests
+        await site.assert_refused(jogger, frozen)
 
 
-async def _a_server_that_freezes(place: Site) -> None:
-    """All waiting requests are handled after the suspension, and move nothing."""
-    async with jogging(place) as jogger:
-        began = own_time()
-        frozen = await _freeze(place.server.process.pid)
+async def _check_frozen_server(site: Site) -> None:
+    """Check that the arm stops, and that requests handled after the suspension do not move it."""
+    async with jogging(site) as jogger:
+        start = own_time()
+        frozen = await _freeze(site.server.process.pid)
         try:
-            await place.rests(began)
+            await site.assert_stops(start)
         finally:
-            place.server.process.send_signal(signal.SIGCONT)
-        await place.is_refused(jogger, frozen)
+            site.server.process.send_signal(signal.SIGCONT)
+        await site.assert_refused(jogger, frozen)
 
 
-async def _a_host_that_freezes(place: Site) -> None:
-    """The controller's watchdog stops the arm meanwhile; requests that waited for the host move nothing."""
-    async with jogging(place) as jogger:
-        host = place.host()
-        began = own_time()
+async def _check_frozen_host(site: Site) -> None:
+    """Check that the controller's watchdog stops the arm, and that requests that waited for the host do not move it."""
+    async with jogging(site) as jogger:
+        host = site.host()
+        start = own_time()
         frozen = await _freeze(host)
         try:
-            await place.rests(began)
+            await site.assert_stops(start)
         finally:
             os.kill(host, signal.SIGCONT)
-        await place.is_refused(jogger, frozen)
+        await site.assert_refused(jogger, frozen)
 
 
-async def _fastest(place: Site, seconds: float, **motion: Any) -> tuple[float, float]:
-    """Hold until the arm has moved for a while and fast; return its highest speed, m/s, and the lowest scale.
+async def _highest_speed(site: Site, seconds: float, **motion: Any) -> tuple[float, float]:
+    """Hold until the arm has moved for `seconds` and exceeded `FAST`. Return the highest speed, m/s, and lowest scale.
 
-    The speed is measured by the arm itself, on its own clock. On a busy machine, the arm slows down between renewals.
+    The arm measures its speed with its own clock. On a busy machine, the arm slows down between renewals.
     """
     poses: list[tuple[float, list[float]]] = []
     speeds: list[float] = []
     moved = 0.0
 
-    def watched() -> bool:
+    def moved_long_enough() -> bool:
         nonlocal moved
-        truth = place.fake.truth()
+        truth = site.fake.truth()
         at, pose = truth["timestamp"], truth["tcp_pose"][:3]
         if poses and at > poses[-1][0] + 0.02:
             speeds.append(math.dist(pose, poses[-1][1]) / (at - poses[-1][0]))
@@ -300,63 +300,65 @@ async def _fastest(place: Site, seconds: float, **motion: Any) -> tuple[float, f
             poses.append((at, pose))
         return moved > seconds and max(speeds) > FAST
 
-    async with place.holding(lambda: place.jog(**motion)) as held:
-        await until(watched, "the arm has moved long enough")
-    await place.jog(valid_ms=0)
-    assert not place.moving()
+    async with site.holding(lambda: site.jog(**motion)) as held:
+        await until(moved_long_enough, "the arm has moved long enough")
+    await site.jog(valid_ms=0)
+    assert not site.is_moving()
     assert not held.refusal
     return max(speeds), min(held.answers)
 
 
-async def _teach(place: Site) -> None:
-    """The arm can be moved by hand while the button is held, and becomes stiff again by itself."""
-    async with place.holding(place.teach):
-        await until(lambda: place.fake.truth()["freedrive"], "the arm can be moved by hand")
-    await until(lambda: not place.fake.truth()["freedrive"], "the arm is stiff again")
+async def _check_hand_teaching(site: Site) -> None:
+    """Check that the arm can be moved by hand while the button is held, and is stiff after the release."""
+    async with site.holding(site.teach):
+        await until(lambda: site.fake.truth()["freedrive"], "the arm can be moved by hand")
+    await until(lambda: not site.fake.truth()["freedrive"], "the arm is stiff again")
     with pytest.raises(RequestFailed, match=r"(motion|hold) has ended|not renewed"):
-        await place.teach()
+        await site.teach()
 
 
-async def _move(place: Site) -> None:
+async def _check_jogging(site: Site) -> None:
     """Hold until the arm moves, then release."""
-    async with place.holding(lambda: place.jog(linear=SLOWLY_UP)) as held:
-        await until(place.moving, "the arm moves")
+    async with site.holding(lambda: site.jog(linear=UP_SLOWLY)) as held:
+        await until(site.is_moving, "the arm moves")
     assert set(held.answers) == {1.0}
-    await place.jog(valid_ms=0)
+    await site.jog(valid_ms=0)
 
 
-async def test_the_tcp_keeps_its_speed_and_protective_stops_are_acknowledged(fake: FakeUr, tmp_path: Path) -> None:
-    async with site(fake, tmp_path) as place:
-        client = place.client
-        await client.call("WriteLock", rpc.WriteLockArgs(place.robot))
-        await _move(place)
-        fastest, _ = await _fastest(place, 0.5, linear=Position(0.0, 0.0, -0.6))
+async def test_the_tcp_stays_below_the_speed_limit_and_protective_stops_are_acknowledged(
+    fake: FakeUr, tmp_path: Path
+) -> None:
+    async with running_site(fake, tmp_path) as site:
+        client = site.client
+        await client.call("WriteLock", rpc.WriteLockArgs(site.robot))
+        await _check_jogging(site)
+        fastest, _ = await _highest_speed(site, 0.5, linear=Position(0.0, 0.0, -0.6))
         assert FAST < fastest < 0.255
         turn = [Joint("shoulder_pan_joint", 1.0)]
-        fastest, scale = await _fastest(place, 0.5, joints=turn)
+        fastest, scale = await _highest_speed(site, 0.5, joints=turn)
         assert FAST < fastest < 0.255
         assert scale < 0.9
 
-        await _teach(place)
+        await _check_hand_teaching(site)
 
-        async with place.holding(lambda: place.jog(joints=turn)) as held:
-            await until(place.moving, "the arm turns")
+        async with site.holding(lambda: site.jog(joints=turn)) as held:
+            await until(site.is_moving, "the arm turns")
             fake.do("protective_stop")
             await until(lambda: held.refusal, "the hold is refused")
         assert "protective stop" in held.refusal
         with pytest.raises(RequestFailed, match="protective stop"):
-            await place.jog(new=True, linear=SLOWLY_UP)
-        await place.rests(own_time())
+            await site.jog(new=True, linear=UP_SLOWLY)
+        await site.assert_stops(own_time())
 
         async def acknowledged() -> bool:
             with contextlib.suppress(RequestFailed):  # at first the controller refuses to unlock it
-                await client.call("AcknowledgeStop", rpc.AcknowledgeStopArgs(place.robot))
+                await client.call("AcknowledgeStop", rpc.AcknowledgeStopArgs(site.robot))
                 return True
             return False
 
         await until(acknowledged, "the stop is acknowledged")
         assert fake.truth()["safety"] == "NORMAL"
-        await place.stays()
+        await site.assert_standstill()
         with pytest.raises(RequestFailed, match="no stop that could be acknowledged"):
-            await client.call("AcknowledgeStop", rpc.AcknowledgeStopArgs(place.robot))
-        await _move(place)
+            await client.call("AcknowledgeStop", rpc.AcknowledgeStopArgs(site.robot))
+        await _check_jogging(site)

@@ -30,7 +30,7 @@ CYCLES = 4
 
 
 class JointLog:
-    """Records of the fakes: the state of the door, and whether the arm is in the zone."""
+    """Record of the fakes: the state of the door, and whether the arm is in the zone."""
 
     def __init__(self, cell: Cell) -> None:
         self.cell = cell
@@ -50,7 +50,7 @@ class JointLog:
 
     async def _follow(self) -> None:
         while True:
-            # The arm first: a line with an open door and an arm inside cannot come from an arm that was too early.
+            # Read the arm first: a line with an open door and an arm inside cannot come from an arm that was too early.
             inside = self._start - await height(self.cell, "robot") > DOWN - 0.05
             door = (await self.cell.command_fake("tester", "truth"))["door"]
             line = (door, "inside" if inside else "outside")
@@ -60,7 +60,7 @@ class JointLog:
 
 
 class Arm:
-    """The arm and its motions by requests."""
+    """The arm, which moves on requests."""
 
     def __init__(self, client: Client, robot_id: str) -> None:
         self.client, self.id = client, robot_id
@@ -73,8 +73,8 @@ class Arm:
         arguments = rpc.MoveToPoseArgs(self.id, "tcp", speed, to.position, to.orientation, safe=False)
         await self.client.call("MoveToPose", arguments)
 
-    async def ended(self) -> str:
-        """Wait for the end of the motion; return why it failed, empty if it did not."""
+    async def wait_for_end(self) -> str:
+        """Wait for the end of the motion. Return the reason of a failure, or an empty text."""
         while True:
             event = await self.client.next_event("RobotMoveToPose", timeout=60)
             if event.data.move_event_type is not MoveEventType.START:
@@ -92,7 +92,7 @@ async def test_the_arm_enters_only_while_the_door_is_confirmed_open(tmp_path: Pa
         arm = Arm(client, ids["robot"])
         start = await arm.pose()
         await arm.move(start, 0.5)  # takes control, which sets the tool
-        assert await arm.ended() == ""
+        assert await arm.wait_for_end() == ""
         await client.call("StopScene")
         await scene_state(client, SceneStateEnum.STOPPED)
 
@@ -108,7 +108,7 @@ async def test_the_arm_enters_only_while_the_door_is_confirmed_open(tmp_path: Pa
         await client.call("StartScene")
         await scene_state(client, SceneStateEnum.STARTED)
         await arm.move(start, 0.5)
-        assert await arm.ended() == ""
+        assert await arm.wait_for_end() == ""
 
         log = JointLog(cell)
         async with log.recording():
@@ -116,14 +116,14 @@ async def test_the_arm_enters_only_while_the_door_is_confirmed_open(tmp_path: Pa
             while not (await states(client)).interlocks[0].waiting:
                 pass
             await cell.command_fake("tester", "push_door", opening=True)
-            assert await arm.ended() == ""
+            assert await arm.wait_for_end() == ""
             assert ("open", "inside") in log.lines
             # The door closes while the arm moves slowly out.
             await arm.move(start, 0.02)
-            await until(partial(moves, cell, "robot"), "the arm moves")
+            await until(partial(is_moving, cell, "robot"), "the arm moves")
             await cell.command_fake("tester", "push_door", opening=False)
-            why = await arm.ended()
-            assert why.startswith("robot: move_to_pose was stopped. Interlock Door: tester: door open is not met")
+            reason = await arm.wait_for_end()
+            assert reason.startswith("robot: move_to_pose was stopped. Interlock Door: tester: door open is not met")
             await until(lambda: log.lines[-1] == ("closed", "inside"), "the door is closed")
         assert not [line for line in log.lines[: log.lines.index(("open", "inside"))] if line[1] == "inside"]
 
@@ -134,7 +134,7 @@ async def test_the_arm_enters_only_while_the_door_is_confirmed_open(tmp_path: Pa
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(ids["robot"]))
         await cell.command_fake("tester", "push_door", opening=True)
         await arm.move(start, 0.5)
-        assert await arm.ended() == ""
+        assert await arm.wait_for_end() == ""
 
 
 @pytest.mark.asyncio
@@ -158,7 +158,7 @@ async def test_two_fake_arms_never_share_a_zone(tmp_path: Path) -> None:
         above = {}
         for name, arm in arms.items():
             await arm.move(await arm.pose(), 0.5)  # takes control, which sets the tool
-            assert await arm.ended() == ""
+            assert await arm.wait_for_end() == ""
             above[name] = await arm.pose()
         await client.call("StopScene")
         await scene_state(client, SceneStateEnum.STOPPED)
@@ -172,13 +172,13 @@ async def test_two_fake_arms_never_share_a_zone(tmp_path: Path) -> None:
         await scene_state(client, SceneStateEnum.STARTED)
 
         heights = {name: await height(cell, name) for name in arms}
-        together: list[set[str]] = [set()]
+        occupied: list[set[str]] = [set()]
 
         async def follow() -> None:
             while True:
                 inside = {name for name in arms if heights[name] - await height(cell, name) > DOWN - 0.05}
-                if inside != together[-1]:
-                    together.append(inside)
+                if inside != occupied[-1]:
+                    occupied.append(inside)
 
         following = asyncio.create_task(follow())
         ends = dict.fromkeys(arms, 0)
@@ -194,9 +194,9 @@ async def test_two_fake_arms_never_share_a_zone(tmp_path: Path) -> None:
             if ends[name] < 2 * CYCLES:
                 await arms[name].move(above[name] if ends[name] % 2 else lowered(above[name]), 1.0)
         following.cancel()
-        assert max(map(len, together)) == 1
+        assert max(map(len, occupied)) == 1
         for name in arms:
-            assert sum(name in inside for inside in together) >= CYCLES
+            assert sum(name in inside for inside in occupied) >= CYCLES
 
 
 def lowered(pose: Pose) -> Pose:
@@ -208,7 +208,7 @@ async def height(cell: Cell, robot: str) -> float:
     return float((await cell.command_fake(robot, "truth"))["tcp_pose"][2])
 
 
-async def moves(cell: Cell, robot: str) -> bool:
+async def is_moving(cell: Cell, robot: str) -> bool:
     """Return whether the fake arm moves."""
     return any(abs(speed) > 1e-3 for speed in (await cell.command_fake(robot, "truth"))["qd"])
 

@@ -1,4 +1,4 @@
-"""The three devices on three computers: the robot on that of the server, tester and reader on nodes of their own."""
+"""Three devices on three computers: the robot on the server's computer, the tester and the reader on one node each."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.rpc import StopKind
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, running_cell, scene_state
-from tests.e2e.test_faults import assert_stays, is_stopped, moving, program_ends_with, until
+from tests.e2e.test_faults import assert_standstill, is_moving, is_stopped, program_error, until
 from tests.server.nodes.conftest import Broker, Node
 
 pytestmark = pytest.mark.xdist_group("nodes")
@@ -48,7 +48,7 @@ async def cell(
         yield running
 
 
-async def opened(cell: Cell, client: Client) -> tuple[Scene, Project]:
+async def open_on_nodes(cell: Cell, client: Client) -> tuple[Scene, Project]:
     """Open the scene and the project; the tester runs on one node, the reader on the other."""
     scene, project = await cell.open(client, boards=1)
     for name, node in (("tester", PRESS), ("reader", OVEN)):
@@ -58,9 +58,9 @@ async def opened(cell: Cell, client: Client) -> tuple[Scene, Project]:
     return scene, project
 
 
-async def test_a_scene_and_a_program_on_three_computers(cell: Cell, nodes: dict[str, Node]) -> None:
+async def test_a_scene_and_a_program_run_on_three_computers(cell: Cell, nodes: dict[str, Node]) -> None:
     client = await cell.client("technician")
-    scene, project = await opened(cell, client)
+    scene, project = await open_on_nodes(cell, client)
     robot, reader = (next(each.id for each in scene.objects if each.name == name) for name in ("robot", "reader"))
 
     await client.call("SetObjectNode", rpc.SetObjectNodeArgs(robot, PRESS))
@@ -75,14 +75,14 @@ async def test_a_scene_and_a_program_on_three_computers(cell: Cell, nodes: dict[
 
     package = await cell.build(client, project)
     await client.call("RunPackage", rpc.RunPackageArgs(package))
-    assert await program_ends_with(client) == ""
+    assert await program_error(client) == ""
     [run, *_] = (await client.call("ListRuns")).runs
     assert run.end is RunEnd.FINISHED
 
     await client.call("RunPackage", rpc.RunPackageArgs(package))
-    await until(lambda: moving(cell), "the arm moves")
+    await until(lambda: is_moving(cell), "the arm moves")
     os.kill(nodes[OVEN].process.pid, signal.SIGSTOP)
-    assert f"the node {OVEN}" in await program_ends_with(client)
+    assert f"the node {OVEN}" in await program_error(client)
     await until(lambda: is_stopped(cell), "the arm stops")
     os.kill(nodes[OVEN].process.pid, signal.SIGCONT)
-    await assert_stays(cell, 0.5)
+    await assert_standstill(cell, 0.5)
