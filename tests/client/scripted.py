@@ -34,7 +34,7 @@ class ScriptedServer:
         self.sockets: list[ServerConnection] = []
         self.url = ""
         self.greeting: list[dict[str, Any]] = [{"event": "ShowMainScreen", "data": {"what": "ScenesList"}}]
-        self.admits = True
+        self.accepts_token = True
 
     async def answer(
         self, socket: ServerConnection, request: dict[str, Any], result: bool = True, text: str = "", code: str = ""
@@ -57,7 +57,7 @@ class ScriptedServer:
         self.sockets.append(socket)
         assert socket.request is not None
         self.tokens.append(socket.request.headers.get("Authorization", ""))
-        if not self.admits:
+        if not self.accepts_token:
             await socket.close(4401, "the token is not valid")
             return
         for event in self.greeting:

@@ -100,7 +100,7 @@ async def test_a_project_is_edited_by_methods_with_typed_events(server: ServerPr
                 await Client(server.url, "ann").open()
 
 
-async def test_documents_assets_and_packages_over_http(server: ServerProcess, tmp_path: Path) -> None:
+async def test_documents_assets_and_packages_are_exchanged_over_http(server: ServerProcess, tmp_path: Path) -> None:
     async with Client(server.url, "ann") as client, Rest(server.url) as rest:
         mesh = os.urandom(300_000)
         source = tmp_path / "part.stl"
@@ -180,8 +180,8 @@ async def test_a_token_grants_only_its_role(tmp_path: Path, monkeypatch: pytest.
                 await rest.scenes()
 
 
-class Killed:
-    """A server on a fixed port that is killed and started again."""
+class RestartableServer:
+    """A server that a test kills and starts again on the same port."""
 
     def __init__(self, data: Path) -> None:
         self.data = data
@@ -201,15 +201,15 @@ class Killed:
         self.port = url.rpartition(":")[2]
         return url
 
-    async def end(self, how: signal.Signals = signal.SIGKILL) -> None:
+    async def end(self, sent: signal.Signals = signal.SIGKILL) -> None:
         assert self.process is not None
         with contextlib.suppress(ProcessLookupError):
-            self.process.send_signal(how)
+            self.process.send_signal(sent)
         await self.process.communicate()
 
 
 async def test_a_killed_server_loses_at_most_one_answer(tmp_path: Path) -> None:
-    server = Killed(tmp_path / "data")
+    server = RestartableServer(tmp_path / "data")
     url = await server.start()
     try:
         async with Client(url, "ann") as client:
@@ -236,7 +236,7 @@ async def test_a_killed_server_loses_at_most_one_answer(tmp_path: Path) -> None:
             await server.end()
             await server.start()
             await editing
-            project = (await _opened_again(client)).data.project
+            project = (await _next_open_project(client)).data.project
             # No acknowledged edit is lost or duplicated; edits of unknown outcome may exist.
             await client.save_project()
             names = [point.name for point in (await client.get_project(project.id)).action_points]
@@ -247,7 +247,7 @@ async def test_a_killed_server_loses_at_most_one_answer(tmp_path: Path) -> None:
         await server.end(signal.SIGTERM)
 
 
-async def _opened_again(client: Client):  # type: ignore[no-untyped-def]
+async def _next_open_project(client: Client):  # type: ignore[no-untyped-def]
     """Read the stream up to the gap and the initial events after it."""
     missed = None
     while missed is None:

@@ -22,7 +22,7 @@ from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, InvalidData, Not
 from tests.client.scripted import ScriptedServer, cut, scripted
 
 
-async def lose(server: ScriptedServer, client: Client) -> None:
+async def disconnect(server: ScriptedServer, client: Client) -> None:
     """Break the connection and wait until the client has noticed."""
     server.sockets[-1].transport.abort()
     async with asyncio.timeout(30.0):
@@ -63,7 +63,7 @@ async def test_the_client_registers_again_before_other_requests() -> None:
         await client.register_for_robot_event(robot_id="r2", what=RobotEventKind.JOINTS, send=True)
         await client.register_for_robot_event(robot_id="r2", what=RobotEventKind.JOINTS, send=False)
         before = len(server.args)
-        await lose(server, client)
+        await disconnect(server, client)
         await client.save_project()
         assert server.asked[-1] == ["RegisterUser", "SubscribeEvents", "RegisterForRobotEvent", "SaveProject"]
         assert server.args[before:-1] == [
@@ -99,12 +99,12 @@ async def test_streams_report_the_gap_after_a_reconnect() -> None:
 
 
 async def test_registering_is_repeated_until_the_name_is_free() -> None:
-    async def taken(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
+    async def refuse_name(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
         await server.answer(socket, request, False, "The name is taken.", "request_refused")
 
     async with scripted() as server, Client(server.url, "ann") as client:
-        server.script["RegisterUser"] = [taken, taken]
-        await lose(server, client)
+        server.script["RegisterUser"] = [refuse_name, refuse_name]
+        await disconnect(server, client)
         await client.save_scene()
         assert [asked[-1] for asked in server.asked] == ["RegisterUser"] * 3 + ["SaveScene"]
         assert (await client.next_event()).event == "ShowMainScreen"
@@ -114,14 +114,14 @@ async def test_registering_is_repeated_until_the_name_is_free() -> None:
         assert (await client.next_event()).event == "ShowMainScreen"
         with pytest.raises(DeviceTimeout):
             await client.next_event(timeout=0.05)
-        server.script["RegisterUser"] = [taken]
+        server.script["RegisterUser"] = [refuse_name]
         with pytest.raises(RequestFailed, match="taken"):
             await Client(server.url, "ann").open()
 
 
 async def test_a_revoked_token_closes_the_client() -> None:
     async with scripted() as server, Client(server.url, token="old") as client:
-        server.admits = False
+        server.accepts_token = False
         await server.sockets[-1].close(4401, "the token is no longer valid")
         await client.next_event("ShowMainScreen")
         for _ in range(2):
@@ -260,7 +260,7 @@ async def test_an_unexpected_error_is_raised_in_waiting_requests(monkeypatch: py
         await client.next_event()
         monkeypatch.setattr("arcor2_hw.client.wire.Wire.open", broken)
         waiting = asyncio.create_task(client.next_event(timeout=30.0))
-        await lose(server, client)
+        await disconnect(server, client)
         with pytest.raises(ZeroDivisionError):
             await waiting
         with pytest.raises(ZeroDivisionError):

@@ -1,4 +1,4 @@
-"""The event stream alone: order, filter, limit, and gaps at their position."""
+"""The event stream without a connection: order, filter, limit, and gaps at their position."""
 
 import asyncio
 
@@ -12,7 +12,7 @@ def stream(*names: str, limit: int = 3) -> EventStream[Event]:
     return EventStream(frozenset(names), limit)
 
 
-async def taken(from_stream: EventStream[Event]) -> list[str]:
+async def event_names(from_stream: EventStream[Event]) -> list[str]:
     return [event.event async for event in from_stream]
 
 
@@ -22,8 +22,8 @@ async def test_events_arrive_in_order_before_the_end() -> None:
         events.put(Event(name))
     events.end()
     events.put(Event("late"))
-    assert await taken(events) == ["a", "b", "c"]
-    assert await taken(events) == []
+    assert await event_names(events) == ["a", "b", "c"]
+    assert await event_names(events) == []
 
 
 async def test_only_followed_events_are_queued() -> None:
@@ -31,7 +31,7 @@ async def test_only_followed_events_are_queued() -> None:
     for name in "bababb":
         events.put(Event(name))
     events.end()
-    assert await taken(events) == ["a", "a"]
+    assert await event_names(events) == ["a", "a"]
 
 
 async def test_dropped_events_are_counted_before_the_remaining_ones() -> None:
@@ -42,7 +42,7 @@ async def test_dropped_events_are_counted_before_the_remaining_ones() -> None:
     with pytest.raises(EventsMissed) as missed:
         await anext(events)
     assert (missed.value.dropped, missed.value.rejoined) == (5, False)
-    assert await taken(events) == ["5", "6", "7"]
+    assert await event_names(events) == ["5", "6", "7"]
 
 
 async def test_consecutive_gaps_are_merged_at_their_position() -> None:

@@ -13,13 +13,13 @@ import pytest
 from arcor2_hw.client import Client
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.project import ActionParameter, Flow
-from tests.client.test_client_on_server import Killed
+from tests.client.test_client_on_server import RestartableServer
 from tests.fakes.conftest import FakeProcess
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "tower_light_client.py"
 RED, AMBER, GREEN = range(3)
 WITHIN = 30.0
-BREAKS = '''"""Fails."""
+BREAKER = '''"""Fails."""
 
 from arcor2_hw.actions import action
 from arcor2_hw.objects import Generic
@@ -44,20 +44,20 @@ def block() -> Iterator[FakeProcess]:
     fake.end()
 
 
-class Watched:
+class Lamps:
     """The lamps of the simulated block."""
 
     def __init__(self, block: FakeProcess) -> None:
         self.block = block
 
-    async def shows(self, lamp: int | None, blinking: bool = False) -> None:
+    async def wait_for(self, lamp: int | None, blinking: bool = False) -> None:
         """Wait until exactly one lamp is lit or blinks."""
         async with asyncio.timeout(WITHIN):
-            while not await asyncio.to_thread(self._shown, lamp, blinking):
+            while not await asyncio.to_thread(self._is_shown, lamp, blinking):
                 await asyncio.sleep(0.05)
 
-    def _shown(self, lamp: int | None, blinking: bool) -> bool:
-        """Return the lamps from the changes of the last 1.1 s, in which a blinking lamp switches on and off."""
+    def _is_shown(self, lamp: int | None, blinking: bool) -> bool:
+        """Return whether the lamps are in this state. The last changes of a lamp show that it blinks."""
         truth: dict[str, Any] = self.block.truth()
         lit = {number for number in range(3) if truth["outputs"][number]}
         changes = [entry for entry in truth["history"] if entry["output"] < 3][-3:]
@@ -69,14 +69,14 @@ class Watched:
 
 
 async def test_the_tower_light_example_shows_the_state_of_the_server(tmp_path: Path, block: FakeProcess) -> None:
-    lamps = Watched(block)
+    lamps = Lamps(block)
     host, _, port = block.ready["modbus"].rpartition(":")
-    server = Killed(tmp_path / "data")
+    server = RestartableServer(tmp_path / "data")
     url = await server.start()
     process = subprocess.Popen([sys.executable, str(EXAMPLE), host, "--port", port, "--url", url])
     try:
         async with Client(url, "ann") as client:
-            await client.rest.put_object_type("Breaker", BREAKS)
+            await client.rest.put_object_type("Breaker", BREAKER)
             await client.new_scene("bench")
             await client.add_object_to_scene(name="time", type="TimeActions")
             await client.add_object_to_scene(name="breaker", type="Breaker")
@@ -84,9 +84,9 @@ async def test_the_tower_light_example_shows_the_state_of_the_server(tmp_path: P
             scene = await client.get_scene((await client.list_scenes())[0].id)
             ids = {obj.name: obj.id for obj in scene.objects}
             await client.start_scene()
-            await lamps.shows(GREEN, blinking=True)
+            await lamps.wait_for(GREEN, blinking=True)
             await client.stop_scene()
-            await lamps.shows(None)
+            await lamps.wait_for(None)
             await client.new_project(scene_id=scene.id, name="wait and break")
             await client.add_action_point(name="here", position=Position(0.0, 0.0, 0.0))
             point = (await client.next_event("ActionPointChanged")).data.id
@@ -112,22 +112,22 @@ async def test_the_tower_light_example_shows_the_state_of_the_server(tmp_path: P
             package = (await client.build_project(project_id=project, package_name="wait")).package_id
             await client.close_project()
             await client.run_package(package, start_paused=True)
-            await lamps.shows(AMBER)
+            await lamps.wait_for(AMBER)
             await client.resume_package()
-            await lamps.shows(GREEN)
-            await lamps.shows(RED, blinking=True)
+            await lamps.wait_for(GREEN)
+            await lamps.wait_for(RED, blinking=True)
             # The lamp stays red after the program has ended, until another program starts.
             await client.run_package(package, start_paused=True)
-            await lamps.shows(AMBER)
+            await lamps.wait_for(AMBER)
             await client.stop_package()
-            await lamps.shows(None)
+            await lamps.wait_for(None)
         await server.end()
-        await lamps.shows(AMBER, blinking=True)
+        await lamps.wait_for(AMBER, blinking=True)
         await server.start()
-        await lamps.shows(None)
+        await lamps.wait_for(None)
         # The killed client cannot switch the lamps; the block's own watchdog does.
         process.kill()
-        await lamps.shows(RED)
+        await lamps.wait_for(RED)
     finally:
         process.kill()
         process.wait(60)
