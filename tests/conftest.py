@@ -28,13 +28,12 @@ LONG = (
 BROWSER = "tests/editor/"
 """The directory of browser tests. They need most of the processor time."""
 CROWDED = (
-    "tests/demo/test_books.py",
     "tests/e2e/test_alarms.py",
     "tests/e2e/test_faults.py",
     "tests/e2e/test_held_motion.py",
 )
 """Files whose tests start a dozen processes each. One worker runs all of them, so that no two run at the same time."""
-APART = (
+INDEPENDENT = (
     "tests/docs/test_tutorials.py",
     "tests/server/cli/test_device_new.py",
     "tests/testing/first_day/test_first_day.py",
@@ -54,8 +53,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     The tests of a parallel run are sorted for a queue that is read from both ends, so that short tests run last.
 
-    At the beginning of the queue are the crowded tests and those that wait for devices, at its end browser tests and
-    before them long ones.
+    The queue begins with the crowded tests and those that wait for devices. It ends with long tests, followed by
+    browser tests.
     """
     if not config.getoption("--matrix"):
         parts: tuple[list[pytest.Item], list[pytest.Item]] = [], []
@@ -87,7 +86,7 @@ def pytest_collection_finish() -> None:
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Run tests that share a fake in one worker: those of a module, or the conformance tests of one driver.
 
-    The tests of the files in `APART` run in any worker.
+    The tests of the files in `INDEPENDENT` run in any worker.
 
     Half of the workers take from the end of the queue, where the browser tests are. So browsers use the processor while
     other tests wait for devices, and a worker starts its browser, server and fakes once. The scopes come from test ids
@@ -100,7 +99,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class FakeScheduling(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file, _, rest = nodeid.partition("::")
-            if file in APART:
+            if file in INDEPENDENT:
                 return nodeid
             if file in CROWDED:
                 return "crowded"

@@ -1,7 +1,8 @@
-"""Imported where servers run in tests: cell hosts, compute workers and relays are forked instead of started.
+"""Fork cell hosts, compute workers and relays of servers instead of starting them. Import this module in a server.
 
-They are forked from a process that has already imported their modules. Starting an interpreter and importing takes
-most of the processor time of a short-lived child. Servers that tests start by the real command start real children.
+The children are forked from a process that has already imported their modules. Starting an interpreter and importing
+takes most of the processor time of a short-lived child. Servers that tests start by the real command start real
+children.
 """
 
 import asyncio

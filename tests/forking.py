@@ -24,7 +24,7 @@ from tests import forking_process, leaks
 BOUND_TO_THE_INTERPRETER = ("PYTHON", "LD_", "MALLOC_", "OPENBLAS_")
 """Prefixes of environment variables that take effect only when an interpreter starts."""
 _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
-"""Of the forking process. A pool of threads does not survive the fork."""
+"""Additional environment of the forking process. A thread pool does not survive a fork."""
 
 
 class Forked:
@@ -51,7 +51,7 @@ class Forked:
 
     def send_signal(self, number: int) -> None:
         if self.poll() is None:
-            with contextlib.suppress(ProcessLookupError):  # its status is on the way
+            with contextlib.suppress(ProcessLookupError):  # it has ended, and its status has not arrived yet
                 os.kill(self.pid, number)
 
     def terminate(self) -> None:
@@ -65,7 +65,7 @@ class Forker:
     """Forks programs from one process, which starts with the first of them and ends with this one.
 
     Args:
-        address: of the process if another process has started it.
+        address: Address of the forking process, if another process has started it.
     """
 
     def __init__(self, address: str = "") -> None:
@@ -95,13 +95,13 @@ class Forker:
         The real command is started if the environment has variables that only a new interpreter reads.
 
         Args:
-            module: to run.
-            arguments: of the program.
-            imports: modules that it imports.
-            stderr: where it writes errors; subprocess.STDOUT is its standard output.
-            environment: of the program, by default that of this process.
-            inherited: files for the program. It has a session of its own then, as children of the server have.
-            name: of the process in the list of processes. It runs as with `python -P` then.
+            module: Module to run.
+            arguments: Arguments of the program.
+            imports: Modules that the program imports.
+            stderr: File for errors. With subprocess.STDOUT, errors are written to standard output.
+            environment: Environment of the program, by default that of this process.
+            inherited: Files for the program. With files, it has a separate session, as children of the server have.
+            name: Name in the list of processes. With a name, the program runs as with `python -P`.
         """
         own = os.environ if environment is None else environment
         fixed = {key: value for key, value in own.items() if key.startswith(BOUND_TO_THE_INTERPRETER)}
@@ -139,7 +139,7 @@ class Forker:
         if self._connection is None:
             if self._address:
                 self._connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-                self._connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, forking_process.LONGEST)
+                self._connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, forking_process.MAX_REQUEST_SIZE)
                 self._connection.connect(f"\0{self._address}")
             else:
                 with leaks.outliving_the_test():
@@ -150,7 +150,7 @@ class Forker:
     def _start(self) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         for end in (ours, theirs):
-            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, forking_process.LONGEST)
+            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, forking_process.MAX_REQUEST_SIZE)
         with theirs, socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
             listener.bind("")  # the kernel chooses an abstract address
             listener.listen()

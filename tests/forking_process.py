@@ -1,4 +1,4 @@
-"""The process from which `tests.forking` forks programs. It imports only what they import."""
+"""The process from which `tests.forking` forks programs. It imports only modules that they import."""
 
 import atexit
 import contextlib
@@ -20,7 +20,7 @@ import traceback
 from pathlib import Path
 from typing import Any, NoReturn
 
-LONGEST = 1 << 20
+MAX_REQUEST_SIZE = 1 << 20
 """Maximum size of a request, bytes."""
 MAX_FDS = 8
 """Maximum number of files that are passed on."""
@@ -32,10 +32,10 @@ def main(connection: socket.socket, listener: socket.socket) -> None:
     """Fork a program for each request, and report how it ends, until the connection is closed.
 
     Args:
-        connection: to the process that started this one.
-        listener: for connections of other processes.
+        connection: Connection to the process that started this one.
+        listener: Listener for connections of other processes.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the programs end as the test says
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # tests decide when the programs end
     with selectors.DefaultSelector() as selector:
         selector.register(connection, selectors.EVENT_READ)
         selector.register(listener, selectors.EVENT_READ)
@@ -68,7 +68,7 @@ def fork(connection: socket.socket) -> tuple[int, int] | None:
         The process id and the pipe for the exit status. None if the connection is closed.
     """
     try:
-        message, fds, _, _ = socket.recv_fds(connection, LONGEST, MAX_FDS)
+        message, fds, _, _ = socket.recv_fds(connection, MAX_REQUEST_SIZE, MAX_FDS)
     except ConnectionError:
         return None
     if not message:
@@ -93,8 +93,8 @@ def become(request: dict[str, Any], fds: list[int]) -> NoReturn:
     """Run a program in this forked process as `python -m` does, and end with its exit status.
 
     Args:
-        request: of `tests.forking.Forker`.
-        fds: standard output and error, the pipe for the exit status, and the inherited files.
+        request: Request of `tests.forking.Forker`.
+        fds: Standard output and error, the pipe for the exit status, and the inherited files.
     """
     module, inherited = request["module"], request["inherited"]
     os.dup2(fds[0], 1)

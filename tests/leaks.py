@@ -33,7 +33,7 @@ class ProcessResources:
 
     @classmethod
     def now(cls, *, again: bool = False) -> "ProcessResources":
-        """Return the present resources. Whether the same children have ended is checked only `again`."""
+        """Return the present resources. Check whether known children have ended only if `again`."""
         sockets = set()
         for fd in Path("/proc/self/fd").iterdir():
             try:
@@ -166,12 +166,12 @@ async def no_leaked_tasks() -> AsyncIterator[None]:
     """
     before = asyncio.all_tasks()
     yield
-    mine = before | {asyncio.current_task()}
-    leaked = asyncio.all_tasks() - mine
+    known = before | {asyncio.current_task()}
+    leaked = asyncio.all_tasks() - known
     deadline = time.monotonic() + GRACE
     while leaked and time.monotonic() < deadline:
         await asyncio.sleep(0.01)
-        leaked = asyncio.all_tasks() - mine
+        leaked = asyncio.all_tasks() - known
     if leaked:
         for task in leaked:
             task.cancel()

@@ -37,7 +37,7 @@ while [ -d /proc/$1 ]; do sleep 1; done
 "$2" -D "$3/data" -m immediate stop
 rm -rf "$3"
 """
-"""Stops the server when the test run has ended, whatever ended it."""
+"""Shell script that stops the server when the test run has ended for any reason."""
 
 
 def pytest_configure() -> None:

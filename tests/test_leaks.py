@@ -20,7 +20,7 @@ def no_other_plugins(monkeypatch: pytest.MonkeyPatch) -> None:
         ("import asyncio\nasync def test(): KEEP.append(asyncio.create_task(asyncio.sleep(9)))", "task"),
     ],
 )
-def test_a_leak_fails_the_test_that_made_it(pytester: pytest.Pytester, body: str, named: str) -> None:
+def test_a_leak_fails_the_test_that_caused_it(pytester: pytest.Pytester, body: str, named: str) -> None:
     pytester.makeconftest(CONFTEST)
     pytester.makepyfile("import threading\nKEEP = []\nEVENT = threading.Event()\n" + body + TIDY)
     result = pytester.runpytest_subprocess("-p", "pytest_asyncio.plugin", "--asyncio-mode=auto", "-W", "ignore")

@@ -13,10 +13,10 @@ from arcor2_server.errors import RequestRefused
 
 
 def test_the_text_is_formatted_and_the_key_has_plain_fields() -> None:
-    made = Message.of("Robot {robot!r} did not answer within {limit:.1f} s.", robot="ur5e", limit=2)
-    assert made.text == str(made) == "Robot 'ur5e' did not answer within 2.0 s."
-    assert made.key == "Robot {robot} did not answer within {limit} s."
-    assert made.values == {"robot": "'ur5e'", "limit": "2.0"}
+    message = Message.of("Robot {robot!r} did not answer within {limit:.1f} s.", robot="ur5e", limit=2)
+    assert message.text == str(message) == "Robot 'ur5e' did not answer within 2.0 s."
+    assert message.key == "Robot {robot} did not answer within {limit} s."
+    assert message.values == {"robot": "'ur5e'", "limit": "2.0"}
 
 
 def test_without_values_braces_have_no_meaning() -> None:
@@ -24,25 +24,25 @@ def test_without_values_braces_have_no_meaning() -> None:
 
 
 def test_doubled_braces_of_a_template_stay_doubled_in_the_key() -> None:
-    made = Message.of("{name} is not {{x}}.", name="a")
-    assert (made.text, made.key) == ("a is not {x}.", "{name} is not {{x}}.")
+    message = Message.of("{name} is not {{x}}.", name="a")
+    assert (message.text, message.key) == ("a is not {x}.", "{name} is not {{x}}.")
 
 
 def test_braces_in_values_have_no_meaning() -> None:
-    made = Message.of("{name}: {reason}", name="{a}", reason=ValueError("{b"))
-    assert (made.text, made.values) == ("{a}: {b", {"name": "{a}", "reason": "{b"})
+    message = Message.of("{name}: {reason}", name="{a}", reason=ValueError("{b"))
+    assert (message.text, message.values) == ("{a}: {b", {"name": "{a}", "reason": "{b"})
 
 
 def test_an_error_or_message_as_value_stays_translatable() -> None:
     inner = InvalidData("{name} is unknown.", name="x")
-    made = Message.of("{device}: {reason}", device="ict1", reason=inner)
-    assert made == Message("ict1: x is unknown.", "{device}: {reason}", {"device": "ict1", "reason": inner.message})
+    message = Message.of("{device}: {reason}", device="ict1", reason=inner)
+    assert message == Message("ict1: x is unknown.", "{device}: {reason}", {"device": "ict1", "reason": inner.message})
     assert Message.of("{reason!r}", reason=inner).values == {"reason": repr(inner)}
 
 
 def test_translation_contains_the_fields_sent_with_the_text() -> None:
-    made = Message.of("{name} is unknown.", name="x")
-    assert made.translation() == {"key": "{name} is unknown.", "values": {"name": "x"}}
+    message = Message.of("{name} is unknown.", name="x")
+    assert message.translation() == {"key": "{name} is unknown.", "values": {"name": "x"}}
     assert Message.of("It is unknown.").translation() == {}
 
 
@@ -72,7 +72,7 @@ def test_an_error_has_text_key_values_and_detail() -> None:
     assert error.message == Message("Scale did not answer.", "{device} did not answer.", {"device": "Scale"})
 
 
-def test_a_value_may_be_called_like_no_argument_of_a_subclass() -> None:
+def test_arguments_of_a_subclass_are_not_values_of_the_message() -> None:
     fault = DeviceFault("Fault {number}.", fault_code=7, number=7)
     assert (str(fault), fault.fault_code) == ("Fault 7.", 7)
     stop = SafetyStop("{robot} stopped.", kind="emergency_stop", robot="ur5e")
