@@ -95,7 +95,7 @@ def is_visible(plate: Plate, world_from_camera: Array, lens: Lens) -> bool:
     width, height = plate.size
     corners = np.array([[x * width / 2, y * height / 2, 0.0, 1.0] for x in (-1, 1) for y in (-1, 1)])
     x, y, z, _ = np.linalg.inv(world_from_camera) @ plate.world_from_plate @ corners.T
-    u, v = rendering.bent(x / z, y / z, lens.coefficients)
+    u, v = rendering.distorted(x / z, y / z, lens.coefficients)
     u, v = u * lens.fx + lens.cx, v * lens.fy + lens.cy
     return bool(z.min() > 0 and u.min() > 8 and v.min() > 8 and u.max() < lens.width - 9 and v.max() < lens.height - 9)
 
@@ -143,8 +143,8 @@ def inaccurate_intrinsics(random: np.random.Generator, factor: float = 1.0) -> C
     """Return the camera's intrinsics with measurement errors."""
     f = 1 + factor * FOCAL * random.normal(size=2)
     c = factor * CENTRE * random.normal(size=2)
-    bent = [k * (1 + factor * DISTORTION * random.normal()) for k in LENS.coefficients]
-    return CameraParameters(LENS.fx * f[0], LENS.fy * f[1], LENS.cx + c[0], LENS.cy + c[1], bent)
+    distorted = [k * (1 + factor * DISTORTION * random.normal()) for k in LENS.coefficients]
+    return CameraParameters(LENS.fx * f[0], LENS.fy * f[1], LENS.cx + c[0], LENS.cy + c[1], distorted)
 
 
 def picture_of(view: View, random: np.random.Generator) -> npt.NDArray[np.uint8]:

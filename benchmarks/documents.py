@@ -99,8 +99,8 @@ class Author:
 
     async def actions(self, point: str, numbers: range) -> list[str]:
         """Add actions; return their ids."""
-        made = await self.many([request("AddAction", **self.dice(point, n)) for n in numbers], "ActionChanged")
-        by_name = {action["name"]: action["id"] for action in made}
+        added = await self.many([request("AddAction", **self.dice(point, n)) for n in numbers], "ActionChanged")
+        by_name = {action["name"]: action["id"] for action in added}
         return [str(by_name[f"action {number}"]) for number in numbers]
 
     async def steps(self, steps: list[dict[str, Any]]) -> None:
@@ -149,7 +149,7 @@ async def logic(report: Report, author: Author, scene: str, echo: ClientConnecti
     chain = await author.actions(point, range(1_001))
     links = zip(chain[1:], [*chain[2:], "END"], strict=True)
     await author.steps([{"start": start, "end": end} for start, end in links])
-    await _close(report, author, "add_logic_item_chain_ms", chain[0], chain[1], Floor(echo, directory))
+    await _add_repeatedly(report, author, "add_logic_item_chain_ms", chain[0], chain[1], Floor(echo, directory))
     await author.ask("CloseProject", force=True)
 
     _, point = await author.project(scene, "branches")
@@ -161,11 +161,12 @@ async def logic(report: Report, author: Author, scene: str, echo: ClientConnecti
             condition = {"what": f"{dice}/default/0", "value": value}
             steps += [{"start": dice, "end": branch, "condition": condition}, {"start": branch, "end": following}]
     await author.steps(steps)
-    await _close(report, author, "add_logic_item_branches_ms", first, blocks[0][0], Floor(echo, directory))
+    await _add_repeatedly(report, author, "add_logic_item_branches_ms", first, blocks[0][0], Floor(echo, directory))
     await author.ask("CloseProject", force=True)
 
 
-async def _close(report: Report, author: Author, metric: str, start: str, end: str, floor: Floor) -> None:
+async def _add_repeatedly(report: Report, author: Author, metric: str, start: str, end: str, floor: Floor) -> None:
+    """Measure AddLogicItem between two actions; the item is removed after each measurement."""
     samples = []
     for number in range(50):
         text = request("AddLogicItem", start=start, end=end)
@@ -213,8 +214,8 @@ async def listing(report: Report, author: Author, scene: str) -> None:
     for number in range(200 - len(await author.ask("ListProjects"))):
         await author.ask("CopyProject", source_id=project, target_name=f"copy {number}")
     assert len(await author.ask("ListProjects")) == 200
-    again = [await author.timed("ListProjects") for _ in range(50)]
-    report.add(Metric("list_projects_200_ms", median(again) * 1e3, len(again)))
+    unchanged = [await author.timed("ListProjects") for _ in range(50)]
+    report.add(Metric("list_projects_200_ms", median(unchanged) * 1e3, len(unchanged)))
     changed = []
     for number in range(10):
         await author.ask("UpdateProjectDescription", project_id=project, new_description=str(number))

@@ -70,7 +70,7 @@ async def _demo(report: Report, directory: Path) -> None:
         actions = {action.name: action.id for action in project.all_actions()}
         run = (await client.list_runs()).runs[0].number
         trace = await client.rest.run_trace(run)
-        real, shorter = real_cycles(trace), shortened_by(trace)
+        real, reductions = real_cycles(trace), shortened_by(trace)
         first = {actions["clear_nest"]: actions[FIRST]}
         branches = {name: {**first, actions["is_good"]: actions[name]} for name in BRANCHES}
         # With an unsaved edit, the server does not measure how much longer motions take than planned.
@@ -81,11 +81,11 @@ async def _demo(report: Report, directory: Path) -> None:
         predicted = {name: await _predicted(client, branches[name]) for name in BRANCHES}
     for metric, times in (("dry_run_demo_percent", predicted), ("dry_run_demo_planned_percent", planned)):
         seen = [name for name in BRANCHES if real[name]]
-        off = {name: 100.0 * abs(times[name] / median(real[name]) - 1.0) for name in seen}
+        deviations = {name: 100.0 * abs(times[name] / median(real[name]) - 1.0) for name in seen}
         notes = [f"{name}: {times[name]:.2f} s, real {', '.join(f'{s:.2f}' for s in real[name])} s" for name in seen]
-        report.add(Metric(metric, max(off.values()), sum(len(real[name]) for name in seen), "; ".join(notes)))
-    shares = [share for found in shorter.values() for share in found]
-    notes = [f"{name}: {', '.join(f'{share:.1f}' for share in found)} %" for name, found in shorter.items() if found]
+        report.add(Metric(metric, max(deviations.values()), sum(len(real[name]) for name in seen), "; ".join(notes)))
+    shares = [share for found in reductions.values() for share in found]
+    notes = [f"{name}: {', '.join(f'{share:.1f}' for share in found)} %" for name, found in reductions.items() if found]
     report.add(Metric("demo_parallel_percent", median(shares), len(shares), "; ".join(notes)))
 
 
@@ -111,7 +111,7 @@ def real_cycles(trace: RunTrace) -> dict[str, list[float]]:
 
 
 def shortened_by(trace: RunTrace) -> dict[str, list[float]]:
-    """Return the reduction of each of these cycles by parallel work, %.
+    """Return the reduction of each cycle of `real_cycles` by parallel work, %.
 
     Without parallel work, the branches would be executed one after the other.
     """
@@ -174,7 +174,6 @@ async def _create(rest: Rest) -> None:
     await rest.put_model(Box("Crate", 0.1, 0.1, 0.1))
     await rest.put_object_type("Crate", CRATE, Box("Crate", 0.1, 0.1, 0.1))
     await rest.put_object_type("Floor", CRATE.replace("Crate", "Floor"), Box("Floor", 2.4, 2.4, 0.1))
-    [Position(0.15 * (n % 5) - 0.3, -0.5 - 0.1 * (n // 5), 0.1 * (n // 5)) for n in range(BOXES)]
     objects = [
         SceneObject("arm", "UR5e", Pose(), [Parameter("host", "string", '"192.168.0.10"')], "obj_arm"),
         SceneObject("floor", "Floor", Pose(Position(0.0, 0.0, -0.06)), id="obj_floor"),

@@ -40,7 +40,7 @@ IDLE_S: Final = 5.0
 SETTLED_S: Final = 1.0
 """Time without a frame and a message after which the page has settled, s."""
 SETTLINGS: Final = 30
-"""Number of such times after which frames are counted anyway."""
+"""Number of such periods after which frames are counted even if the page has not settled."""
 EDITS: Final = 60
 STOPS: Final = 10
 RESTARTS: Final = 3
@@ -199,14 +199,14 @@ async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, pro
         await one.page.get_by_role("searchbox").fill(point.name)  # the list draws only the rows in view
         await one.page.get_by_role("row", name=f"{point.name} Action point").click()
 
-        async def latencies(what: str, acts: str, act: Callable[[int], Awaitable[None]]) -> list[float]:
+        async def latencies(effects: str, inputs: str, act: Callable[[int], Awaitable[None]]) -> list[float]:
             took = []
             for number in range(EDITS):
-                before = len((await _observed(two))[what])
+                before = len((await _observed(two))[effects])
                 await act(number)
-                acted = (await _observed(one))[acts][-1]
-                await two.until("([what, before]) => window.__bench[what].length > before", [what, before])
-                took.append((await _observed(two))[what][before] - acted)
+                entered = (await _observed(one))[inputs][-1]
+                await two.until("([name, before]) => window.__bench[name].length > before", [effects, before])
+                took.append((await _observed(two))[effects][before] - entered)
                 await asyncio.sleep(0.05)
             return took
 

@@ -29,11 +29,11 @@ RESULTS: Final = 10_000
 PER_WRITE: Final = 100
 """Number of units that are stored in one transaction of the cell."""
 WITHIN: Final = 300.0
-_CHANGED: Final = """([name, what]) => {
+_CHANGED: Final = """([name, part]) => {
   const read = () => {
     const cards = [...document.querySelectorAll(".fleet-card")];
     const card = cards.find((each) => each.querySelector(".fleet-name").textContent === name);
-    return what === "level" ? card.dataset.level : card.querySelector(".fleet-facts").textContent;
+    return part === "level" ? card.dataset.level : card.querySelector(".fleet-facts").textContent;
   };
   const before = read();
   document.documentElement.dataset.waits = "";
@@ -46,7 +46,7 @@ _CHANGED: Final = """([name, what]) => {
     check();
   });
 }"""
-"""Resolves when the card of a cell shows something else."""
+"""Resolves when the text or the level on the card of a cell changes."""
 _TICKS: Final = os.sysconf("SC_CLK_TCK")
 
 
@@ -112,9 +112,9 @@ async def _task_duration(session: CDPSession) -> float:
     return float(metrics["TaskDuration"])
 
 
-async def _until(page: Page, cell: int, act: Callable[[], None], what: str) -> float:
+async def _until(page: Page, cell: int, act: Callable[[], None], part: str) -> float:
     """Return the time from an action until the card of a cell shows another text or level, s."""
-    changed = asyncio.create_task(page.evaluate(_CHANGED, [name_of(cell), what]))
+    changed = asyncio.create_task(page.evaluate(_CHANGED, [name_of(cell), part]))
     await expect(page.locator("html[data-waits]")).to_be_attached()
     begin = time.perf_counter()
     act()
@@ -178,7 +178,7 @@ async def _wait(read: Callable[[], int], expected: int) -> None:
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure all of it. The page needs Chromium."""
+    """Measure everything in this group. The page needs Chromium."""
     folder = directory / "fleet"
     folder.mkdir()
     broker = Broker(folder, options=("--jetstream", "--store_dir", str(folder / "store")))

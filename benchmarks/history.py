@@ -162,7 +162,7 @@ async def recording(directory: Path, compute: Compute) -> Metric:
 
 
 async def run(report: Report, folder: Path) -> None:
-    """Run the group."""
+    """Measure everything in this group."""
     settings = ServerSettings(data_dir=folder / "history", point_history=True, point_history_days=100_000)
     settings.data_dir.mkdir()
     compute = Compute(60.0)

@@ -105,6 +105,6 @@ async def measure(directory: Path) -> list[Metric]:
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Run the group."""
+    """Measure everything in this group."""
     for metric in await measure(directory):
         report.add(metric)

@@ -24,12 +24,12 @@ SIZE = 1 << 20
 
 def context(folder: Path, *, server: bool) -> ssl.SSLContext:
     """Return a context of one end. The client checks that the local authority issued the server's certificate."""
-    made = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER if server else ssl.PROTOCOL_TLS_CLIENT)
+    created = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER if server else ssl.PROTOCOL_TLS_CLIENT)
     if server:
-        made.load_cert_chain(folder / "chain.pem", folder / "key.pem")
+        created.load_cert_chain(folder / "chain.pem", folder / "key.pem")
     else:
-        made.load_verify_locations(folder / "authority.pem")
-    return made
+        created.load_verify_locations(folder / "authority.pem")
+    return created
 
 
 def zenoh_session(folder: Path, port: int, *, server: bool) -> Any:

@@ -330,15 +330,15 @@ async def _engines(report: Report, folder: Path) -> None:
             _, asking = await asyncio.get_running_loop().create_connection(
                 _Asking, "127.0.0.1", int(number), ssl=tls, server_hostname="localhost"
             )
-            ways: dict[str, Callable[[], Awaitable[object]]] = {
+            engines: dict[str, Callable[[], Awaitable[object]]] = {
                 "broker": lambda: client.request(SUBJECT, payload, WITHIN),
                 "socket": lambda: asking.ask(payload),
             }
             if ask_zenoh is not None:
-                ways["zenoh"] = ask_zenoh
-            samples: dict[str, list[float]] = {name: [] for name in ways}
+                engines["zenoh"] = ask_zenoh
+            samples: dict[str, list[float]] = {name: [] for name in engines}
             for repetition in range(CALLS + 50):
-                for name, ask in ways.items():
+                for name, ask in engines.items():
                     duration = await timed(ask)
                     if repetition >= 50:
                         samples[name].append(duration)
@@ -351,7 +351,7 @@ async def _engines(report: Report, folder: Path) -> None:
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure all of it."""
+    """Measure everything in this group."""
     folder = directory / "nodes"
     folder.mkdir()
     places = [folder / name for name in ("broker", "cache", "engines", "several")]

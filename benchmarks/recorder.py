@@ -51,7 +51,7 @@ async def run(report: Report, folder: Path) -> None:
 
 
 def demo() -> None:
-    """Run the command line; the server of the demo is a process of its own, which runs this module."""
+    """Run the command line; the server of the demo runs this module in a separate process."""
     from arcor2_server.cli.main import main
     from arcor2_server.demo import run as demo_run
     from arcor2_server.demo.processes import python_module

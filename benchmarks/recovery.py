@@ -228,7 +228,7 @@ def grown(first: Resources, last: Resources) -> tuple[int, str]:
     """Return the growth summed over the kinds, and a text that names new resources."""
     more = {kind: max(0, last[kind].total() - first[kind].total()) for kind in first}
     counts = ", ".join(f"{first[kind].total()} to {last[kind].total()} {kind}" for kind in first)
-    new = [f"{n} {what}" for kind in first if more[kind] for what, n in (last[kind] - first[kind]).items()]
+    new = [f"{n} {name}" for kind in first if more[kind] for name, n in (last[kind] - first[kind]).items()]
     return sum(more.values()), counts + (f"; more: {', '.join(new)}" if new else "")
 
 
@@ -258,10 +258,10 @@ def measure(cycles: int) -> list[Metric]:
     every = [sample for trial in trials for sample in trial.all_samples()]
     never = [f"{trial.link.name} never recovered from {case}" for trial in trials for case in trial.never_recovered]
     parts = (f"worst of {len(trials)} links: {worst.link.name}", f"of all {percentile(every, 95):.2f} s", *never)
-    growth, what = grown(first, last)
+    growth, counts = grown(first, last)
     return [
         Metric("recovery_p95_s", percentile(worst.all_samples(), 95), len(every), "; ".join(parts)),
-        Metric("recovery_growth", growth, cycles, f"{what}; {memory}"),
+        Metric("recovery_growth", growth, cycles, f"{counts}; {memory}"),
     ]
 
 

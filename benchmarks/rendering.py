@@ -112,7 +112,7 @@ def _bits(number: int, dictionary: int) -> Array:
 
 
 # ------------------------------------------------------------------------------------------------ rays
-def bent(x: Array, y: Array, coefficients: tuple[float, ...]) -> tuple[Array, Array]:
+def distorted(x: Array, y: Array, coefficients: tuple[float, ...]) -> tuple[Array, Array]:
     """Return the distorted coordinates of a ray through (x, y) at distance 1."""
     k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = (*coefficients, *(0.0,) * (12 - len(coefficients)))
     q = x * x + y * y
@@ -131,9 +131,9 @@ def rays(lens: Lens) -> Array:
     x, y = aim_x.copy(), aim_y.copy()
     step = 1e-6
     for _ in range(30):
-        at_x, at_y = bent(x, y, lens.coefficients)
-        right_x, right_y = bent(x + step, y, lens.coefficients)
-        up_x, up_y = bent(x, y + step, lens.coefficients)
+        at_x, at_y = distorted(x, y, lens.coefficients)
+        right_x, right_y = distorted(x + step, y, lens.coefficients)
+        up_x, up_y = distorted(x, y + step, lens.coefficients)
         a, b, c, d = (right_x - at_x) / step, (up_x - at_x) / step, (right_y - at_y) / step, (up_y - at_y) / step
         miss_x, miss_y = aim_x - at_x, aim_y - at_y
         determinant = a * d - b * c
@@ -144,7 +144,7 @@ def rays(lens: Lens) -> Array:
     raise ValueError("The distortion is not invertible: some pixels have no ray.")
 
 
-def _met(plate: Plate, world_from_camera: Array, x: Array, y: Array) -> tuple[Array, Array]:
+def _intersections(plate: Plate, world_from_camera: Array, x: Array, y: Array) -> tuple[Array, Array]:
     """Return the intersections of rays with a plate in its frame, m; NaN for rays that miss it or meet its back."""
     plate_from_camera = np.linalg.inv(plate.world_from_plate) @ world_from_camera
     r, eye = plate_from_camera[:3, :3], plate_from_camera[:3, 3]
@@ -163,7 +163,7 @@ def _box(plate: Plate, world_from_camera: Array, lens: Lens) -> tuple[slice, sli
     """Return the part of the picture (with its margin of one) that can show a plate."""
     coarse = 8
     grid = rays(lens)[::coarse, ::coarse]
-    x, y = _met(plate, world_from_camera, grid[..., 0], grid[..., 1])
+    x, y = _intersections(plate, world_from_camera, grid[..., 0], grid[..., 1])
     width, height = plate.size
     with np.errstate(invalid="ignore"):
         seen = (np.abs(x) < 0.6 * width) & (np.abs(y) < 0.6 * height)
@@ -183,7 +183,7 @@ def _paint(picture: Array, plate: Plate, world_from_camera: Array, lens: Lens, s
         return
     rows, columns = box
     grid = rays(lens)[rows.start - 1 : rows.stop + 1, columns.start - 1 : columns.stop + 1]
-    margin_x, margin_y = _met(plate, world_from_camera, grid[..., 0], grid[..., 1])
+    margin_x, margin_y = _intersections(plate, world_from_camera, grid[..., 0], grid[..., 1])
     x, y = margin_x[1:-1, 1:-1], margin_y[1:-1, 1:-1]
     # Within a pixel, the position on the plate is interpolated from the neighbouring pixels.
     x_by_u, y_by_u = ((at[1:-1, 2:] - at[1:-1, :-2]) / 2 for at in (margin_x, margin_y))

@@ -56,7 +56,7 @@ async def fill(directory: Path) -> None:
         await author.actions(point, range(ACTIONS - UNSAVED, ACTIONS))
 
 
-async def killed(directory: Path) -> float:
+async def start_and_kill(directory: Path) -> float:
     """Return the time from starting the server until a client has the open project, s; then kill the server."""
     begin = time.perf_counter()
     async with server_process.server(directory) as (url, process):
@@ -75,14 +75,14 @@ async def run(report: Report, directory: Path) -> None:
     await fill(data)
     for processes in BUSY:
         with busy(processes):
-            samples = [await killed(data) for _ in range(ROUNDS)]
+            samples = [await start_and_kill(data) for _ in range(ROUNDS)]
         note = f"median {median(samples):.2f} s, worst {max(samples):.2f} s"
         report.add(Metric(f"restart_{processes}_busy_p95_s", percentile(samples, 95), ROUNDS, note))
-    first, again = [], []
+    first, second = [], []
     for _ in range(5):
         async with server_process.server(data) as (url, _process), server_process.socket(url) as socket:
             author = Author(socket)
             first.append(await author.timed("ListProjects"))
-            again.append(await author.timed("ListProjects"))
-    note = f"second {median(again) * 1e3:.2f} ms"
+            second.append(await author.timed("ListProjects"))
+    note = f"second {median(second) * 1e3:.2f} ms"
     report.add(Metric("list_projects_200_first_ms", median(first) * 1e3, len(first), note))

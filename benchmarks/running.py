@@ -37,7 +37,7 @@ STOPS = 10
 DISTINCT = 1000
 
 
-def project(name: str, actions: int, does: str) -> dict[str, Any]:
+def project(name: str, actions: int, action_type: str) -> dict[str, Any]:
     """Return a project of `actions` consecutive actions of the same type."""
     ids = [f"act_{number}" for number in range(actions)]
     ends = ["START", *ids, "END"]
@@ -50,7 +50,7 @@ def project(name: str, actions: int, does: str) -> dict[str, Any]:
                 "name": f"ap{number}",
                 "id": f"acp_{number}",
                 "position": {"x": 0, "y": 0, "z": 0},
-                "actions": [{"name": f"do_{number}", "id": key, "type": does, "flows": [{}]}],
+                "actions": [{"name": f"do_{number}", "id": key, "type": action_type, "flows": [{}]}],
             }
             for number, key in enumerate(ids)
         ],

@@ -62,7 +62,7 @@ async def selecting(report: Report, screen: Screen) -> None:
         await page.get_by_role("searchbox").fill(name)
         await page.get_by_role("row", name=f"{name} Action point", exact=True).click()
 
-    async def measured(way: str, note: Callable[[], str], select: Callable[[str], Awaitable[None]]) -> None:
+    async def measured(method: str, note: Callable[[], str], select: Callable[[str], Awaitable[None]]) -> None:
         took = []
         for item, name in points:
             await screen.close_panels()
@@ -72,7 +72,7 @@ async def selecting(report: Report, screen: Screen) -> None:
             await select(name)
             await panel.get_by_role("heading", name=name, exact=True).wait_for()
             took.append((time.perf_counter() - begin) * 1e3)
-        report.add(Metric(f"select_{way}_ms", median(took), len(took), f"{note()}; worst {max(took):.0f} ms"))
+        report.add(Metric(f"select_{method}_ms", median(took), len(took), f"{note()}; worst {max(took):.0f} ms"))
 
     await page.keyboard.press("x")
     await measured("crosshair", lambda: f"{1 + nexts / SELECTED:.2g} taps on average", crosshair)

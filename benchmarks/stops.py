@@ -132,22 +132,22 @@ def stops_of(kind: type[Bench], count: int) -> tuple[list[float], list[str]]:
     """Return the latencies of the stops of a driver, s, and the errors of failed stops."""
     bench = kind()
     bench.start()
-    late, wrong = [], []
+    latencies, failures = [], []
     try:
         bench.reset()
         device, stamps = bench.controlled(), _stamps(bench)
         for _ in range(count):
             try:
-                late.append(one_stop(bench, device, stamps))
+                latencies.append(one_stop(bench, device, stamps))
             except RuntimeError as error:
-                wrong.append(str(error))
+                failures.append(str(error))
                 bench.release()
                 bench.reset()
                 device = bench.controlled()
     finally:
         bench.release()
         bench.end()
-    return late, wrong
+    return latencies, failures
 
 
 @contextlib.contextmanager
@@ -180,28 +180,28 @@ def busy() -> Iterator[None]:
 def _stop_all(count: int) -> tuple[dict[type[Bench], list[float]], list[str]]:
     with ThreadPoolExecutor(len(BENCHES), thread_name_prefix="stopping") as pool:
         results = list(pool.map(lambda kind: stops_of(kind, count), BENCHES))
-    wrong = [text for _, texts in results for text in texts]
-    return {kind: late for kind, (late, _) in zip(BENCHES, results, strict=True)}, wrong
+    failures = [text for _, texts in results for text in texts]
+    return {kind: latencies for kind, (latencies, _) in zip(BENCHES, results, strict=True)}, failures
 
 
 def measure_busy(count: int) -> list[Metric]:
     """Measure in a busy process, in this thread."""
     with busy():
-        found, wrong = _stop_all(count)
-    late = [each for samples in found.values() for each in samples]
+        found, failures = _stop_all(count)
+    latencies = [each for samples in found.values() for each in samples]
     notes = ", ".join(f"{kind.type_name()} {percentile(found[kind], 99) * 1e3:.0f}" for kind in found if found[kind])
     done = count * len(BENCHES)
     return [
-        Metric("busy_stops_lost", len(wrong), done, "; ".join(wrong[:5])),
-        Metric("busy_stop_p99_ms", percentile(late, 99) * 1e3, len(late), f"p99 of each: {notes}"),
+        Metric("busy_stops_lost", len(failures), done, "; ".join(failures[:5])),
+        Metric("busy_stop_p99_ms", percentile(latencies, 99) * 1e3, len(latencies), f"p99 of each: {notes}"),
     ]
 
 
 def measure() -> Metric:
     """Measure in this thread."""
-    found, wrong = _stop_all(STOPS)
-    if wrong:
-        raise RuntimeError("; ".join(wrong))
+    found, failures = _stop_all(STOPS)
+    if failures:
+        raise RuntimeError("; ".join(failures))
     p99 = {kind.type_name(): percentile(samples, 99) * 1e3 for kind, samples in found.items()}
     notes = [f"{kind.type_name()} {p99[kind.type_name()]:.1f} ({median(found[kind]) * 1e3:.1f})" for kind in found]
     note = f"p99 (median) of each: {', '.join(notes)}; {STOPS} stops each"

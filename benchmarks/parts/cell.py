@@ -94,13 +94,13 @@ class Cell:
             with contextlib.suppress(Arcor2Error):
                 await self.command(fake, command, **arguments)
 
-    async def kill(self, what: str) -> None:
+    async def kill(self, target: str) -> None:
         """Kill the cell hosts, or the server, as a power cut does; then start the server again."""
         server = self._server.pid
-        for pid in [server] if what == "server" else list(_hosts_of(server)):
+        for pid in [server] if target == "server" else list(_hosts_of(server)):
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
-        if what == "server":
+        if target == "server":
             await self._server.stop()
             self._server = self._new_server()
             self.url = await self._server.start()

@@ -35,7 +35,7 @@ class Checks:
     def __init__(self, cell: Cell, result: Result, say: Callable[[str], None]) -> None:
         self._cell, self.result, self._say = cell, result, say
 
-    async def still(self, before: Any, when: str) -> None:
+    async def check_no_motion(self, before: Any, when: str) -> None:
         """Record a problem if anything has moved without a command of a person."""
         if (after := await self._cell.joints()) != before:
             self.found(self.result.moved, f"moved {when}: {before} -> {after}")

@@ -47,7 +47,7 @@ class Operator:
     async def resolve(self, client: Client, held: HeldData) -> None:
         """Remove the cause, inspect the cell, correct the inventory, acknowledge, and decide."""
         self._checks.result.holds += 1
-        still = await self._cell.joints()
+        before = await self._cell.joints()
         self.tries[held.action_id] += 1
         tries = self.tries[held.action_id]
         self._say(f"  held at {held.action_name} ({held.kind}): {held.text}")
@@ -61,7 +61,7 @@ class Operator:
         if not isinstance(shown, Unset) and shown.since == held.since:
             held = shown  # with fewer choices after the confirmation
         choice, results = await self._choose(client, held, tries)
-        await self._checks.still(still, f"while held at {held.action_name}")
+        await self._checks.check_no_motion(before, f"while held at {held.action_name}")
         deadline = time.monotonic() + DECISION_TIMEOUT
         while not self._faults.killed.is_set():
             await self._acknowledge(client, held)

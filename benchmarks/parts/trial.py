@@ -37,7 +37,7 @@ class Trial:
         self._checks = Checks(self._cell, Result(boards), say)
         self._faults = Faults(self._cell, random.Random(seed), faults, self._checks.result, say)
         self._operator = Operator(self._cell, self._faults, self._checks, say)
-        self._most_starts = 10 + 2 * faults
+        self._max_starts = 10 + 2 * faults
 
     async def run(self) -> Result:
         """Run the cell until every board is in a box, or was taken out."""
@@ -46,7 +46,7 @@ class Trial:
         try:
             while not await self._cell.finished():
                 await self._run_program()
-                if result.starts > self._most_starts:
+                if result.starts > self._max_starts:
                     raise RuntimeError(f"The program was started {result.starts} times: the cell makes no progress.")
             await self._last_results()
             await self._checks.results()
@@ -74,9 +74,9 @@ class Trial:
                 self._say("  interrupted")
         if self._faults.killed.is_set():
             await self._faults.injected()
-            still = await cell.joints()
+            before = await cell.joints()
             await asyncio.sleep(0.3)
-            await self._checks.still(still, "after an interruption")
+            await self._checks.check_no_motion(before, "after an interruption")
 
     async def _start(self, client: Client) -> None:
         deadline = time.monotonic() + DECISION_TIMEOUT

@@ -76,7 +76,7 @@ def test_rays_match_ground_truth_where_the_board_was_seen() -> None:
     x, y = np.meshgrid(np.linspace(-0.4, 0.4, 9), np.linspace(-0.3, 0.3, 7))
     points = np.column_stack((x.ravel(), y.ravel(), np.ones(x.size)))
     got = cv2.projectPoints(points, np.zeros(3), np.zeros(3), matrix, np.array(p.dist_coefs))[0].reshape(-1, 2)
-    u, v = rendering.bent(x.ravel(), y.ravel(), LENS.coefficients)
+    u, v = rendering.distorted(x.ravel(), y.ravel(), LENS.coefficients)
     true = np.column_stack((u * LENS.fx + LENS.cx, v * LENS.fy + LENS.cy))
     # A shift of the middle is equivalent to a rotation of the camera, not a property of the lens.
     left = (got - true) - (got - true).mean(axis=0)
