@@ -3,10 +3,10 @@
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 
-/** Most decimals that Intl can write; no double has more useful ones. */
+/** Largest number of decimals that Intl accepts; a double has no more significant ones. */
 const ALL = 20;
 
-/** Return a function that makes one object per language and key: making a formatter takes longer than using it. */
+/** Return a function that creates each formatter once per language and key, since creating one is slow. */
 function perLanguage<Key, Made>(make: (language: string, key: Key) => Made): (key: Key) => Made {
   const made = new Map<string, Made>();
   return (key) => {
@@ -72,6 +72,7 @@ export function compared(one: string, other: string): number {
   return order("names").compare(one, other);
 }
 
+/** Units of relative times, each used below its limit, s. */
 const STEPS: readonly [number, Intl.RelativeTimeFormatUnit][] = [
   [60, "second"],
   [3600, "minute"],

@@ -1,6 +1,6 @@
 /**
- * Entry of the editor: create the client and the session, load the texts, show the page, and join as the user who was
- * here last.
+ * Entry of the editor: create the client and the session, load the texts, show the page, and join as the last user of
+ * this device.
  */
 
 import { StrictMode } from "react";

@@ -3,7 +3,7 @@
 /** Delays before each further attempt, s; the last one is repeated. */
 const PAUSES = [0.5, 1, 2, 4];
 
-/** Repeat until it succeeds; return the result. */
+/** Call `load` until it succeeds, and return its result. */
 export async function persistently<T>(load: () => Promise<T>): Promise<T> {
   for (let attempt = 0; ; attempt++) {
     try {

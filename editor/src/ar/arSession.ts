@@ -29,14 +29,14 @@ import { Sharing } from "./sharing";
 import { ArProblem, obstacleOfError } from "./support";
 import type { Found } from "./tracker";
 
-/** Time for which the orientation sensor replaces the markers, and the time without it, ms. */
+/** Time for which the last view is shown without markers, ms: turned by the orientation sensor, and without it. */
 const BRIDGE = 1500;
 const BLINK = 300;
 /** Time between two reports of the state, ms, unless its phase changes. */
 const REPORT = 250;
 /** Time for which a correction is reported, ms. */
 const CORRECTION = 4000;
-/** The hidden fraction of the items by phase. Before the first registration, their place is not known. */
+/** The fraction by which the items are hidden, by phase. Before the first registration, their pose is unknown. */
 const VEILS: Readonly<Record<Ar["phase"], number>> = {
   starting: 1,
   looking: 1,
@@ -63,11 +63,11 @@ export interface CameraOptions {
   placement: (camera: string) => Placement;
   storePlacement: (camera: string, placement: Placement) => void;
   report: (state: Partial<Ar>) => void;
-  /** Called when the camera ends without our doing. */
+  /** Called when the camera stops unexpectedly. */
   ended: () => void;
 }
 
-/** Open the camera at the back. Reject with ArProblem. It has to be called in a tap. */
+/** Open the camera at the back. Reject with ArProblem. Call it in the handler of a tap, as browsers require. */
 export async function openCamera(): Promise<MediaStream> {
   try {
     return await navigator.mediaDevices.getUserMedia({ audio: false, video: WANTED });
@@ -363,7 +363,7 @@ export class ArSession implements ArMode {
     this.onPicture();
   }
 
-  /** Return the view of a picture without its markers: the last one, turned as the device was. */
+  /** Return the view expected without markers: the last one, turned as the device was turned since. */
   private predicted(orientation: Mat3 | null): View | null {
     if (!this.anchor) return null;
     const { orientation: before } = this.anchor;

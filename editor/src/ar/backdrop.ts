@@ -10,7 +10,7 @@ const inverse = new Matrix4();
 const plane = new Matrix4();
 const pose = new Matrix4();
 
-/** The position of a picture in a view that it fills: factor, and pixels of the view. */
+/** The size of a picture in a view that it fills: scale, and pixels of the view. */
 export interface Placement {
   scale: number;
   width: number;
@@ -23,7 +23,7 @@ export function placed(picture: { width: number; height: number }, view: { width
   return { scale, width: picture.width * scale, height: picture.height * scale };
 }
 
-/** Return the point of a picture, pixels, at a point of the view that it fills. */
+/** Return the point of a picture, pixels, for a point of the view that the picture fills. */
 export function pictured(
   [x, y]: Point,
   picture: { width: number; height: number },

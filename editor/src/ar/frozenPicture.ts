@@ -1,4 +1,4 @@
-/** A picture that stays behind the items in an XR session. */
+/** A frozen picture behind the items in an XR session. */
 
 import { type CanvasTexture, Matrix4, type Scene } from "three";
 import { DEPTH, discard, type Sheet, sheetOf, textureOf } from "./sheet";

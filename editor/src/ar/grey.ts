@@ -16,7 +16,7 @@ export function greyOf(rgba: ArrayLike<number>, width: number, height: number): 
   return { data, width, height };
 }
 
-/** Return a picture whose rows are from the bottom, upright. */
+/** Return an upright copy of a picture whose rows start at the bottom. */
 export function flipped({ data, width, height }: Grey): Grey {
   const out = new Uint8Array(data.length);
   for (let y = 0; y < height; y++) out.set(data.subarray(y * width, (y + 1) * width), (height - 1 - y) * width);

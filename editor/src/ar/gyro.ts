@@ -1,4 +1,4 @@
-/** The orientation of the device, which bridges moments without a marker in sight. */
+/** The orientation of the device, which replaces the markers for a moment while none is visible. */
 
 import { apply, type Mat3, multiply, rotation, scale, transposed } from "./geometry";
 import { eyeOf, type View } from "./pose";

@@ -1,6 +1,6 @@
 /**
  * Controllers and hands of a headset: their rays press buttons of the panel, select and move items, and touch known
- * points. A motion that the user holds ends when its controller or hand is lost.
+ * points. A hold-to-run motion stops when its controller or hand is no longer tracked.
  */
 
 import {
@@ -34,7 +34,7 @@ const CONE = 0.02;
 const MAX_TOUCH_MOVEMENT = 0.01;
 const FRAMES = 3;
 
-/** Moves an item that a ray holds: pose of the point at which it is held, in the workplace. */
+/** Moves an item that a ray has grabbed. `to` takes the new position of the grabbed point in the workplace. */
 export type Grab = { to: (at: Vector3) => void; end: () => void };
 
 export interface HeadsetHost {
@@ -43,10 +43,10 @@ export interface HeadsetHost {
   /** Pose of the workplace in the frame of WebXR. */
   workplace: () => Matrix4 | null;
   report: (state: Partial<Ar>) => void;
-  /** End a motion that is held. */
+  /** Stop the hold-to-run motion. */
   release: () => void;
   stopMotion: () => void;
-  /** Called when no button stops motion any more. */
+  /** Called when no stop button is available any more. */
   stopOutOfReach: () => void;
   /** Start to move an item; null if it is not selected or cannot be moved. */
   grab: (id: string, at: Vector3) => Grab | null;
@@ -107,7 +107,7 @@ export class Headset {
     this.touching = touching && { ...touching, points: [] };
   }
 
-  /** Take the poses of controllers and hands in a frame. */
+  /** Update the poses of controllers and hands in a frame. */
   frame(frame: XRFrame, space: XRReferenceSpace, viewer: Matrix4, tracked: boolean): void {
     this.panel.follow(viewer);
     this.readButtons();
@@ -130,7 +130,7 @@ export class Headset {
     this.hold();
   }
 
-  /** The user can reach neither the panel nor the buttons. */
+  /** Handle that the user can reach neither the panel nor the buttons. */
   hide(): void {
     this.end();
     this.reach(false);
@@ -149,7 +149,7 @@ export class Headset {
       gamepad?.mapping === "xr-standard" ? STOP_BUTTONS.flatMap((n) => gamepad.buttons[n] ?? []) : [],
     );
     const pressed = stops.some((each) => each.pressed);
-    // By its press, as every Stop.
+    // Every Stop acts on press, not on release.
     if (pressed && !this.pressedStop) this.host.stopMotion();
     this.pressedStop = pressed;
     // Browsers pass no buttons to a session that is covered.

@@ -43,7 +43,7 @@ const FARTHEST = 20;
 
 const about = (angle: number): Mat3 => rotation([0, 0, angle]);
 
-/** Return the movement that is equal to `inner`, and then `outer`. */
+/** Return the movement that applies `inner`, then `outer`. */
 export function combined(outer: Movement, inner: Movement): Movement {
   return {
     angle: outer.angle + inner.angle,

@@ -67,7 +67,7 @@ const DISTINCT = 0.02;
 const NEAREST = 0.02;
 const ROUNDS = 15;
 
-/** Return the place of the camera, m. */
+/** Return the position of the camera, m. */
 export const eyeOf = ({ turn, shift }: View): Vec3 => scale(apply(transposed(turn), shift), -1);
 
 /** Return where a point of the workplace is in the picture, pixels; null behind the camera. */

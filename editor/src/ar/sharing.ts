@@ -16,7 +16,7 @@ export class Sharing {
 
   constructor(private readonly report: (camera: Pose | null) => void) {}
 
-  /** Take the view of a picture; null while it is unknown. `now`: time, ms. */
+  /** Report the view of a picture if it is due; null while it is unknown. `now`: time, ms. */
   take(view: View | null, now: number): void {
     const { last } = this;
     if (!view && !last) return;

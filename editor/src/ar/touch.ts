@@ -70,7 +70,7 @@ export function fitTouched(known: readonly Vec3[], touched: readonly Vec3[]): To
   return { workplace, error, grade: error > FAIR ? "rough" : error > GOOD ? "fair" : "good" };
 }
 
-/** Return the points with which the sides of the triangle do not have their lengths. */
+/** Return the points that make sides of the triangle too long or too short. */
 function misplaced(known: readonly Vec3[], touched: readonly Vec3[]): number[] {
   // Side n is opposite to point n.
   const off = [0, 1, 2].map((n) => Math.abs(sideOf(known, n) - sideOf(touched, n)));

@@ -11,7 +11,7 @@ import { type Eye, lensIn } from "./xrView";
 /** Time between two pictures, ms. Each of them costs the device a copy. */
 const PERIOD = 150;
 
-/** When and from where a picture was taken. */
+/** The time and the camera poses of a picture. */
 export interface Taken {
   eyes: readonly (Eye & { viewport: XRViewport })[];
   camera: Matrix4;
@@ -21,7 +21,7 @@ export interface Taken {
 
 interface Handlers {
   found: (found: Found, ms: number, taken: Taken) => void;
-  /** Called with a picture that was asked for by `keepNext`. */
+  /** Called with the picture that `captureNext` requested. */
   kept: (picture: HTMLCanvasElement, taken: Taken) => void;
   failed: () => void;
 }
@@ -58,7 +58,7 @@ export class XrPictures {
     this.send({ setup: { codes, places, focal: null } });
   }
 
-  /** Keep the next picture. */
+  /** Pass the next picture to `captured`. */
   keepNext(): void {
     this.keeps = true;
   }

@@ -40,11 +40,11 @@ const FAR = 100;
 
 interface Options extends Omit<HeadsetHost, "workplace"> {
   report: (state: Partial<Ar>) => void;
-  /** Called when the session ends without our doing. */
+  /** Called when the session ends unexpectedly. */
   ended: () => void;
 }
 
-/** Start an XR session with the page over it. It has to be called in a tap. */
+/** Start an XR session with the page over it. Call it in the handler of a tap, as browsers require. */
 export function requestXr(): Promise<XRSession> {
   return (navigator.xr as XRSystem).requestSession("immersive-ar", {
     optionalFeatures: ["hit-test", "anchors", "dom-overlay", "camera-access", "hand-tracking"],

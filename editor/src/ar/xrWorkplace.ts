@@ -1,4 +1,4 @@
-/** The pose of the workplace in an XR session: as registered, kept by an anchor between registrations. */
+/** The pose of the workplace in an XR session. Between registrations, an anchor tracks it. */
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import type { Vec3 } from "./geometry";
@@ -86,7 +86,7 @@ export class XrWorkplace {
     this.register(new Matrix4().compose(at, turn, new Vector3(1, 1, 1)), "hand", 0, viewer);
   }
 
-  /** Move it as a movement in its own frame does. */
+  /** Move the workplace by a movement in its own frame. */
   move(by: Movement, camera: Matrix4): void {
     if (this.pose) this.set(workplaceIn(movedView(viewOf(this.pose, camera), by), camera));
   }
@@ -125,7 +125,7 @@ export class XrWorkplace {
         const made = matrixOf(at.matrix);
         this.anchor = { of, pose: made, workplace: inverseOf(made).multiply(this.pose) };
       })
-      .catch(() => {}); // then the frame of the session holds it
+      .catch(() => {}); // without an anchor, the pose is fixed in the frame of the session
   }
 }
 

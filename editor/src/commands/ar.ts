@@ -42,7 +42,7 @@ export async function loadMarkers(): Promise<Layout> {
 /**
  * Start AR; call it in a tap, since browsers ask for the camera and the motion sensor only then. Reject with ArProblem.
  *
- * @param onEnd called with the obstacle if AR ends later without our doing.
+ * @param onEnd called with the obstacle if AR ends unexpectedly.
  */
 export async function startAr(layout: Layout, method: ArMethod, onEnd: (obstacle: Obstacle) => void): Promise<void> {
   leaveAr();
@@ -97,7 +97,7 @@ async function xrMode(layout: Layout, engine: Engine | null, ended: () => void):
   });
 }
 
-/** No button of a headset stops motion any more: end the motion that is held, and the program that was started here. */
+/** Handle that no stop button of a headset is available: stop hold-to-run and the program started from this headset. */
 function stopOutOfReach(): void {
   const { runtime } = now();
   endHolds();
@@ -114,7 +114,7 @@ export async function startHere(start: () => Promise<unknown>): Promise<void> {
   runtime.startedHere = program;
   const started = await start();
   if (started === false) runtime.startedHere = undefined;
-  else if (program.lost) void stopMotion(); // it was lost before the program had started
+  else if (program.lost) void stopMotion(); // Stop went out of reach before the program had started
 }
 
 /** The program has ended; the next one may be started elsewhere. */
@@ -122,7 +122,7 @@ export function programEnded(): void {
   now().runtime.startedHere = undefined;
 }
 
-/** Move the selected item with a ray. `from`: the point at which it is held, m. */
+/** Move the selected item with a ray. `from`: the grabbed point, m. */
 function grab(id: string, from: Vector3): Grab | null {
   const state = now();
   const target = state.ui.selection?.id === id ? targetOf(state, state.ui.selection) : null;
@@ -138,7 +138,7 @@ function grab(id: string, from: Vector3): Grab | null {
   };
 }
 
-/** Leave AR, stop the camera and end a held motion. `stay`: continue in the 3D view from the same viewpoint. */
+/** Leave AR, stop the camera and hold-to-run. `stay`: continue in the 3D view from the same viewpoint. */
 export function leaveAr(stay = false): void {
   const { ar } = now().runtime;
   if (ar) endHolds();

@@ -7,7 +7,7 @@ import { now, store } from "../store/store";
 /** Time within which the event of a change arrives after the answer, s. */
 const WITHIN = 5;
 
-/** Wait until an event brings something into the store. Reject if it does not arrive in time. */
+/** Wait until `find` finds something in the state, and return it. Reject if it does not within the time limit, s. */
 export function awaited<T>(find: (state: State) => T | undefined, within = WITHIN): Promise<T> {
   return new Promise((resolve, reject) => {
     const known = find(now());

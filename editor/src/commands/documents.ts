@@ -63,7 +63,7 @@ export const duplicateScene = (source_id: string, target_name: string) => ask("C
 export const duplicateProject = (source_id: string, target_name: string) =>
   ask("CopyProject", { source_id, target_name });
 
-/** For fields that show the reason of a refusal themselves. */
+/** Change a description. Return why it was refused, for fields that show the reason. */
 export const describe = (kind: "scene" | "project", id: string, new_description: string): Promise<string> =>
   refusal(() =>
     kind === "scene"

@@ -1,4 +1,4 @@
-/** Functions of the open project: make, open, change, export and import them. */
+/** Functions of the open project: create, open, change, export and import them. */
 
 import { t } from "@lingui/core/macro";
 import { functionNames, picked, suggestedName } from "../program/functions";

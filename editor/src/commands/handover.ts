@@ -14,7 +14,7 @@ export function withdrawRequest(id: string): void {
   storeViewState("shared", { [keyOf(id)]: null });
 }
 
-/** Notify the user of requests from now on. Return a function that ends it. */
+/** Notify the user of requests from now on. Return a function that stops it. */
 export function followItemRequests(): () => void {
   return store.subscribe((state, before) => {
     const { wanted, free } = handOver(state, before);

@@ -11,7 +11,7 @@ import { held, sentence } from "./requests";
 
 export type JogWhat = Omit<JogRobotArgs, "robot_id" | "hold" | "sent_ms" | "valid_ms">;
 
-/** A held motion. `over` resolves with the reason if it ended for another reason than release. */
+/** A running hold-to-run motion. `over` resolves at its end, with the reason if the user did not release it. */
 export interface Held {
   end: () => void;
   over: Promise<string>;
@@ -19,12 +19,12 @@ export interface Held {
 
 declare module "../store/runtime" {
   interface Runtime {
-    /** The lease of the held motion. */
+    /** The lease of the running hold-to-run motion. */
     lease?: Lease | undefined;
   }
 }
 
-/** Release everything. */
+/** Stop the running hold-to-run motion. */
 export function endHolds(): void {
   now().runtime.lease?.end();
 }

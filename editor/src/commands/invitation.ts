@@ -11,7 +11,7 @@ export interface Joining {
   authority: string;
 }
 
-/** Request it from the server; an older server does not know it, so the address of this page is returned. */
+/** Request the data from the server. An older server does not have it: return the address of this page. */
 export async function loadInvitation(): Promise<Joining> {
   const here = isHere(location.hostname) ? [] : [location.origin];
   try {

@@ -107,7 +107,7 @@ async function anyPlace(objectId: string, slot: Slot | null, step: CallOptions):
   return { pointId: await newPoint("program", position, step) };
 }
 
-/** Connect a new action in a slot: what was there follows it. */
+/** Connect a new action in a slot, before the actions that were there. */
 export async function insert(id: string, slot: Slot, step: CallOptions): Promise<void> {
   const { doc } = now();
   if (!doc) return;
@@ -199,7 +199,7 @@ export async function removeAction(id: string): Promise<void> {
 
 // ------------------------------------------------------------------------------------------------ connections
 
-/** Start a connection: the next tap on an action ends it. */
+/** Start a connection: the next tap on an action selects its target. */
 export function startConnecting(from: string, condition?: ProjectLogicIf, item?: string, error = false): void {
   setUi({ connecting: { from, condition, item, error } });
 }

@@ -1,4 +1,4 @@
-/** The active robot: selection, motion, and the ghost that shows it elsewhere. Held motions: holdToRun.ts. */
+/** The active robot: selection, motion, and the ghost that shows it at another pose. Hold-to-run: holdToRun.ts. */
 
 import { t } from "@lingui/core/macro";
 import type { Joint, Pose, RobotArg, RobotFeatures, StepAxis, StepMode, StepWhat } from "../protocol/types";
@@ -160,9 +160,9 @@ export function acknowledgeStop(object_id: string): Promise<string> {
 
 // ------------------------------------------------------------------------------------------------ ghost
 export interface Showing {
-  /** Return whether the answer is still needed. */
+  /** Return whether the answer is still needed; by default it is. */
   current?: () => boolean;
-  /** No joints are known for the pose: keep the ghost and mark it as impossible. */
+  /** Whether the ghost is kept and marked as impossible if there are no joints for the pose. */
   keep?: boolean;
 }
 
@@ -201,7 +201,7 @@ export function showJoints(robotId: string, joints: Joint[], problem = ""): void
   setUi({ ghost: { robotId, joints, problem } });
 }
 
-/** Show the robot with its base at a pose in the world. */
+/** Show the ghost of the robot with its base at a pose in the world. */
 export function showStanding(robotId: string, at: Pose): void {
   const joints = [...(telemetry.latest(robotId)?.joints ?? [])].map(([name, value]) => ({ name, value }));
   setUi({ ghost: { robotId, joints, problem: "", at } });

@@ -197,7 +197,7 @@ export const removeObject = (id: string, force = false) => ask("RemoveFromScene"
 export const setParameters = (id: string, parameters: Parameter[]): Promise<string> =>
   refusal(() => held(id, () => call("UpdateSceneObjectSettings", { id, parameters })));
 
-/** Scenes that use a type, and its deletion. */
+/** Return the names of the scenes that use a type. */
 export async function scenesUsing(type: string): Promise<string[]> {
   const ids = await call("ObjectTypeUsage", { id: type });
   return ids.map((each) => now().lists.scenes?.find((one) => one.id === each)?.name ?? each);

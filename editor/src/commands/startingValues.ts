@@ -120,7 +120,7 @@ async function startingValue(
   return initial(wanted);
 }
 
-/** Return an existing result of a type as a link. */
+/** Return a link to a stored result of a type; undefined if there is none. */
 function imageFor(type: string): string | undefined {
   const { doc, types } = now();
   for (const action of Object.values(doc?.actions ?? {})) {

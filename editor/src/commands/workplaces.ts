@@ -1,4 +1,4 @@
-/** Moves this device from this cell to another one. */
+/** Switch this device from this cell to another one. */
 
 import { theSession } from "../session/session";
 import { now } from "../store/store";

@@ -1,4 +1,4 @@
-/** Marks robots whose reports are old. */
+/** Mark robots whose reports are outdated. */
 
 import type { Thing } from "./thing";
 import { RobotThing } from "./things/robot";
@@ -6,7 +6,7 @@ import { RobotThing } from "./things/robot";
 /** Time between two checks, ms. */
 const PERIOD = 250;
 
-/** Check until the returned function is called. After a pause of the page, reports that wait are handled first. */
+/** Check until the returned function is called. After the page was suspended, waiting reports are handled first. */
 export function checkAges(things: ReadonlyMap<string, Thing>, onOutdated: () => void): () => void {
   let checkedAt = 0;
   const timer = setInterval(() => {

@@ -1,9 +1,9 @@
-/** Models with moving parts: called before each frame until the parts have reached their reported positions. */
+/** Animate models with moving parts: before each frame, until the parts have reached their reported positions. */
 
 import type { Quality } from "./surface";
 import type { Thing } from "./thing";
 
-/** Longest time of a step, s: after a pause nothing jumps. */
+/** Longest time of a step, s, so that no part jumps after a pause. */
 const LONGEST = 0.1;
 
 export class Animation {

@@ -41,7 +41,7 @@ vec3 lit( vec3 color, vec3 normal, float far ) {
   for ( int i = 0; i < NUM_DIR_LIGHTS; i ++ )
     light += directionalLights[ i ].color * clamp( dot( normal, directionalLights[ i ].direction ), 0.0, 1.0 );
   vec3 shade = clamp( light * diffuse * color * 0.3183098861837907, 0.0, 1.0 );
-  // sRGB to a thousandth, of roots alone, which cost a tenth of powers.
+  // Approximates sRGB to 0.001 with square roots, which cost a tenth of pow().
   vec3 root = sqrt( shade ), second = sqrt( root );
   shade = clamp(
     0.662002687 * root + 0.684122060 * second - 0.323583601 * sqrt( second ) - 0.0225411470 * shade, 0.0, 1.0
@@ -113,7 +113,7 @@ void main() {
 }`,
 };
 
-/** The same for upright pucks: the squares show the upper side, an ellipse, and the edge below it. */
+/** Squares that show upright pucks: the upper side as an ellipse, and the edge below it. */
 const PUCKS = {
   vertexShader: `
 ${SQUARES}
@@ -237,7 +237,7 @@ export class Baked {
     this.material.dispose();
   }
 
-  /** Vertices of the triangles of an instance. */
+  /** Number of entries of the index for one instance. */
   private get corners(): number {
     return this.ball > 0 ? 6 : (this.shape.index?.count ?? this.shape.getAttribute("position").count);
   }

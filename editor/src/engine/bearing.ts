@@ -20,7 +20,7 @@ export function bearingOf(engine: Engine, id: string): Bearing | null {
   return bearing(thing.anchor(new Vector3()), engine.view.camera, width, height);
 }
 
-/** Turn the view to an item without changing the distance to the target. */
+/** Move the view to an item without changing its direction or its distance to the target. */
 export function lookAt(engine: Engine, id: string): void {
   const thing = engine.shown().things.get(id);
   if (!thing) return;

@@ -1,4 +1,4 @@
-/** Clusters: objects that are small on the screen and crowd there have one label with their number. Pure functions. */
+/** Clusters: objects that are small and close together on the screen share one label with their number. Pure. */
 
 import type { Rect } from "./labels";
 
@@ -38,8 +38,8 @@ export const boxOf = ({ x, y }: Cluster): Rect => ({
 });
 
 /**
- * Return the clusters of objects in a view. Labels of clusters are inside the view and overlap neither each other nor
- * what is taken; clusters whose labels would are one cluster, or none.
+ * Return the clusters of objects in a view. Their labels are inside the view. Clusters whose labels would overlap are
+ * merged; a cluster whose label would overlap a `taken` rectangle is left out.
  */
 export function clustersOf(spots: readonly Spot[], width: number, height: number, taken: readonly Rect[]): Cluster[] {
   const waiting = new Set(spots.filter(({ size }) => size < LARGE));

@@ -1,4 +1,4 @@
-/** Robots of cylinders and spheres, dressed: housings with caps at the joints, tubes between them. A separate chunk. */
+/** Robots built of cylinders and spheres: show housings with caps at the joints, and tubes. A separate chunk. */
 
 import { type BufferGeometry, Matrix4, type Mesh, Quaternion, type SphereGeometry, Vector3 } from "three";
 import type { URDFJoint, URDFLink } from "urdf-loader";

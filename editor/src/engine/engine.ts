@@ -221,13 +221,13 @@ export class Engine {
     return { things: this.things, width: this.width, height: this.height };
   }
 
-  /** Call a function after each frame; return a function that ends it. */
+  /** Call a function after each frame; return a function that unsubscribes it. */
   watch(by: () => void): () => void {
     this.watchers.add(by);
     return () => this.watchers.delete(by);
   }
 
-  /** Choose the labels and their free places by this function from now on. Only a changed scene needs a frame. */
+  /** Set the function that selects the labels and reserves places. A frame is drawn only if the scene changed. */
   arrangeBy(arrange: Arrange): void {
     this.labelling.arrange = arrange;
     const { things, view, width, height } = this;
@@ -355,7 +355,7 @@ export class Engine {
     return flying || moving;
   }
 
-  /** Update all frames, or only the frames of robots, whose joints have no children. */
+  /** Update the frames of all items after a change of an item, otherwise only those of robots that moved. */
   private place(): void {
     const movedRobots = [...this.movedRobots];
     this.movedRobots.clear();
@@ -385,7 +385,7 @@ export class Engine {
     const { camera } = this.view;
     camera.updateMatrixWorld();
     if (!this.requests.driven) this.resolution.follow(camera);
-    // Sizes on the screen are adjusted when the camera has stopped: to place hundreds of items takes most of a frame.
+    // Sizes on the screen are adjusted when the camera has stopped: placing hundreds of items takes most of a frame.
     if (!this.resolution.moving) for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
     this.place();
     this.gizmo.place();

@@ -6,7 +6,7 @@ import { corners } from "./framing";
 import type { Item } from "./items";
 import { boundsOf, type Thing } from "./thing";
 
-/** Time after a fit in which the places of devices arrive, ms: on a slow network, some seconds. */
+/** Time after a fit within which added devices belong to it, ms. On a slow network, their poses arrive late. */
 const SOON = 8000;
 
 export class Fitting {
@@ -33,12 +33,12 @@ export class Fitting {
     if (this.fitted && this.fitted.distanceTo(this.view.camera.position) < 1e-6) this.fit();
   }
 
-  /** An item was added: if it is a device soon after a fit, it belongs to it. */
+  /** Handle an added item: a device that is added soon after a fit belongs to that fit. */
   added({ kind, id }: Item): void {
     if (kind === "object" && performance.now() - this.fittedAt < SOON) this.awaited.add(id);
   }
 
-  /** A model appears: fit the view again, if it was to show this item. Later ones do not move the camera. */
+  /** Handle a loaded model: fit the view again if the last fit waits for it. Later ones do not move the camera. */
   loaded(id: string): void {
     if (this.awaited.delete(id)) this.refit();
   }

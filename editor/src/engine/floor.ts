@@ -86,7 +86,7 @@ export class Floor {
     this.scale?.paint(palette);
   }
 
-  /** Add the numbers, which are not needed for the first picture; `draw` draws them. */
+  /** Add the numbers, which the first picture does not need; `draw` requests a frame. */
   async number(draw: () => void): Promise<void> {
     const { Scale } = await persistently(() => import("./floorScale"));
     this.scale = new Scale(AXIS, STEP);
@@ -117,7 +117,7 @@ function fill(geometry: BufferGeometry, [places, colours]: Lines): void {
   geometry.computeBoundingSphere();
 }
 
-/** Return the level of the floor, m: that of the world, or the lower side of the lowest object. */
+/** Return the level of the floor, m: 0, or the lower side of the lowest object below it. */
 export function lowest(things: Iterable<Thing>): number {
   let level = 0;
   for (const thing of things) if (thing.item.kind === "object") level = Math.min(level, boundsOf(thing).min.z);

@@ -101,7 +101,7 @@ export function filled(points: readonly Vector3[], { position, target }: Placed,
   return ((box.right - box.left) * (box.top - box.bottom)) / free;
 }
 
-/** Return the direction, among those of a person in front of the workplace, in which the points fill the view best. */
+/** Return the direction in front of the workplace from which the points fill the view best. */
 export function bestDirection(points: readonly Vector3[], opening: FramedView): Vector3 {
   let best = new Vector3();
   let most = 0;

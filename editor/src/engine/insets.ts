@@ -84,7 +84,7 @@ export function drawInset(
   for (const each of hidden) each.visible = true;
 }
 
-/** Hide what has a size on the screen of the large view, such as handles. */
+/** Hide items of constant size on the screen, such as handles, since insets have another scale. Return them. */
 function hide(scene: Object3D): Object3D[] {
   const found = scene.children.filter((each) => each.visible && each.userData.handles);
   for (const each of found) each.visible = false;

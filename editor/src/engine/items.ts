@@ -57,7 +57,7 @@ export interface RobotItem extends Base {
   urdf: string;
   /** Whether the axes of its end effectors are drawn. */
   axes: boolean;
-  /** Joints are expected; without reports it is marked as outdated. */
+  /** Whether reports of joints are expected; without them, the robot is marked as outdated. */
   online: boolean;
   fault: boolean;
   /** Icon and values of the gripper at its flange; undefined without one. */
@@ -96,7 +96,7 @@ export interface PuckItem extends Base {
   level: number;
   /** Number of these pucks. */
   count: number;
-  /** The pucks of the point lie around it; otherwise they are stacked, and the uppermost shows their number. */
+  /** Whether the pucks are arranged around the point; otherwise they are a stack, whose top one shows their number. */
   open: boolean;
   role: "action" | "call" | "start" | "end";
   running: boolean;
@@ -111,12 +111,12 @@ export interface LinkItem extends Base {
   kind: "logic";
   from: string;
   to: string;
-  /** Both ends are in one closed stack: it is not drawn. */
+  /** Whether both ends are in one closed stack, so that it is not drawn. */
   inside: boolean;
   /** Text at the line; empty for an unconditional connection. */
   condition: string;
   branch: "always" | "true" | "false" | "value" | "error";
-  /** The running program has followed it: drawn in the colour of what runs. */
+  /** Whether the running program has followed it; it is then drawn in the colour of running actions. */
   taken?: boolean;
 }
 

@@ -15,7 +15,7 @@ const WEIGHTS: Record<Item["kind"], number> = {
   logic: 0,
 };
 
-/** Width of the view below which only what matters most has a label, pixels: on a phone. */
+/** Width of the view below which only the most important items have a label, pixels: on a phone. */
 const NARROW = 600;
 /** Distance from the camera within which points and actions are labelled, m. */
 const NEAR = 0.9;
@@ -52,7 +52,7 @@ export class Labelling {
   }
 }
 
-/** Show the conditions of steps where they cover neither a name nor another one; return whether that changed. */
+/** Show the labels of conditions that overlap no other label; return whether the visibility of one changed. */
 function placeConditions(
   things: Map<string, Thing>,
   labels: Labels,
@@ -77,8 +77,8 @@ function placeConditions(
 }
 
 /**
- * Priority: selected, under the pointer or crosshair, with a badge, near. In a narrow view only these, what runs, and
- * robots; the others when they are tapped.
+ * Return the labels with their priorities: selected, under the pointer or crosshair, with a badge, near. In a narrow
+ * view, only these, running actions and robots have a label; other items get one when they are tapped.
  */
 export function labelsOf(
   things: ReadonlyMap<string, Thing>,

@@ -1,4 +1,4 @@
-/** Height of the selected item, and the line below it; what draws the line is loaded for the first one. */
+/** Height of the selected item, and the line below it. The module that draws the line is loaded on first use. */
 
 import { t } from "@lingui/core/macro";
 import { type Scene, Vector3 } from "three";

@@ -1,4 +1,4 @@
-/** The straight path of the tool; what draws it is loaded for the first one. */
+/** The straight path of the tool. The module that draws it is loaded on first use. */
 
 import type { Scene } from "three";
 import { persistently } from "../persistently";

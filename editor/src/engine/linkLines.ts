@@ -23,7 +23,7 @@ export class LinkLines {
     if (this.mesh) this.mesh.height = pixels;
   }
 
-  /** Draw a line in a colour, or no longer. */
+  /** Draw a line in a colour; null removes it. */
   set(id: string, arrow: Arrow | null, color: Color): void {
     const before = this.lines.get(id);
     const hex = color.getHexString();

@@ -122,7 +122,7 @@ const MOVERS: Record<string, Mover[]> = {
       pivot: [0, 0.082, 0.04],
       unknown: 1,
       speed: 1.5,
-      // Open it is upright, closed it lies on the nest.
+      // The door is upright when it is open, and lies on the nest when it is closed.
       pose: (part, at) => part.rotation.set(((1 - at) * Math.PI) / 2, 0, 0),
     },
   ],
@@ -230,7 +230,7 @@ export class DeviceModel {
     }
   }
 
-  /** Move the parts for a time, s; Infinity: to where they are reported, once. Return whether they move further. */
+  /** Move the parts for a time, s; Infinity: to their reported positions. Return whether they move further. */
   step(seconds: number): boolean {
     let more = false;
     for (const part of this.moving) {
@@ -253,7 +253,7 @@ export class DeviceModel {
   }
 }
 
-/** Return the model for an icon of an object type, a tower light with these lamps; null if there is none. */
+/** Return the model for an icon of an object type; null if there is none. `lamps`: those of a tower light. */
 export function modelOf(icon: string, lamps: readonly string[] = USUAL): DeviceModel | null {
   const parts = MODELS[icon];
   return parts ? new DeviceModel(icon, parts, lamps) : null;

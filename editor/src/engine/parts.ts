@@ -2,8 +2,8 @@
  * Parts on an object, drawn where sensors detect them. On a belt that runs, a part that leaves a sensor glides at the
  * reported speed until the next sensor detects it. A separate chunk.
  *
- * Sensors report faster than the belt reports its speed (every 0.25 s), so a part can leave a sensor of a belt that
- * seems to stand still. It waits there until the speed arrives.
+ * Sensors report faster than the belt reports its speed (every 0.25 s), so a part can leave a sensor of a belt whose
+ * reported speed is still 0. It waits there until the speed arrives.
  */
 
 import { BoxGeometry, type Material, Mesh, type Object3D } from "three";
@@ -60,7 +60,7 @@ export class Parts {
     return this.glides;
   }
 
-  /** Move the parts for a time, s; without end: draw no parts between sensors. Return whether they move further. */
+  /** Move the parts for a time, s; Infinity: remove the parts between sensors. Return whether they move further. */
   step(seconds: number): boolean {
     for (const glider of [...this.gliders]) {
       const { mesh, to } = glider;

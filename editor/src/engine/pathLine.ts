@@ -82,7 +82,7 @@ function same(a: StraightPath | null, b: StraightPath | null): boolean {
   return a.state === b.state && apart(a.from, b.from) < POSE_TOLERANCE && apart(a.to, b.to) < POSE_TOLERANCE;
 }
 
-/** Along y, from the origin; a sphere at its end. */
+/** Return a line or its dashes along y, from the origin, with a sphere at the end. */
 function pieces(length: number, dash: readonly [number, number] | null): BufferGeometry {
   const found: BufferGeometry[] = [new SphereGeometry(RADIUS * 3, 12, 8).translate(0, length, 0)];
   const [on, off] = dash ?? [length, 0];

@@ -12,7 +12,7 @@ export interface Hit {
   distance: number;
 }
 
-/** Radii of additional rays around the pointer, pixels, since fingers are wide and points small. */
+/** Directions of additional rays around the pointer, since fingers are wide and points small. */
 const AROUND: [number, number][] = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [
   Math.cos((n * Math.PI) / 4),
   Math.sin((n * Math.PI) / 4),
@@ -30,8 +30,8 @@ export interface Size {
 
 /**
  * Return the items at a position in the view, pixels from the upper left corner. Direct hits come first, near before
- * far; then items within `slack` pixels. `small` tells which ids are hard to hit: they precede large items close to
- * them.
+ * far; then items within `slack` pixels. `small` returns whether an id is hard to hit: such items precede large ones
+ * close to them.
  */
 export function pick(
   x: number,

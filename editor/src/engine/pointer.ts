@@ -11,7 +11,7 @@ export interface PointerHandlers {
   onHover: (x: number, y: number) => void;
 }
 
-/** Listen to the pointer on a canvas; return a function that ends it. */
+/** Listen to the pointer on a canvas; return a function that stops listening. */
 export function followPointer(canvas: HTMLCanvasElement, { onTap, onHover }: PointerHandlers): () => void {
   let start: { x: number; y: number; time: number } | null = null;
   const position = (event: PointerEvent) => {

@@ -7,7 +7,7 @@ import { type Camera, Matrix4 } from "three";
 
 /** Part of the resolution while the camera moves. */
 const MOVING = 0.5;
-/** Time without a motion after which the picture is drawn in full, ms: longer than a frame on a slow machine. */
+/** Time without a motion after which the picture has the full resolution, ms: longer than a slow frame. */
 const REST = 300;
 
 export class Resolution {
@@ -31,7 +31,7 @@ export class Resolution {
     this.set(this.part, true);
   }
 
-  /** Called before each frame. A single jump of the camera is drawn in full at once. */
+  /** Called before each frame. A single jump of the camera keeps the full resolution. */
   follow({ matrixWorld }: Camera, now = performance.now()): void {
     const rested = now - this.movedAt >= REST;
     if (this.last.equals(matrixWorld)) {
@@ -51,7 +51,7 @@ export class Resolution {
     return this.steps > 1;
   }
 
-  /** Draw the next frame in full. */
+  /** Draw the next frame in full resolution. */
   full(): void {
     this.steps = 0;
     this.set(1);

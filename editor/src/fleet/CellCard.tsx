@@ -1,4 +1,4 @@
-/** One cell on the page: state, program, counts, alarms, and who controls it. */
+/** One cell on the page: state, program, counts, alarms, and the client in control. */
 
 import { plural, t } from "@lingui/core/macro";
 import { memo, useState } from "react";
@@ -19,7 +19,7 @@ export const CellCard = memo(function CellCard({ card, level }: { card: FleetCar
         <Icon name={ICONS[level]} />
         <span className="fleet-name">{name}</span>
       </h3>
-      {/* The heading of the group says it already. */}
+      {/* The heading of the group already contains the state. */}
       <p className={level === "running" ? "hidden-but-read" : "fleet-state"}>{stateText(card)}</p>
       {reason && <p className="fleet-reason">{reason}</p>}
       {card.conflict && <p className="fleet-reason small">{state.address || state.identity}</p>}

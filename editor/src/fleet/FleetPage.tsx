@@ -1,5 +1,5 @@
 /**
- * The page with all cells: those that need attention come first, and what was stored of all of them. A tap on a card
+ * The page with all cells, those that need attention first, and with their stored units and alarms. A tap on a card
  * opens the operator's screen of the cell.
  */
 
@@ -100,7 +100,7 @@ function Cells({ cards, connected, loaded }: Pick<Fleet, "cards" | "connected" |
   const shown = [...cards.values()].filter(
     ({ name, state }) => name.includes(wanted) || state.program.toLowerCase().includes(wanted),
   );
-  // Without the server of the fleet, nothing that is shown is known to be true.
+  // Without a connection to the server of the fleet, all shown states may be outdated.
   const current = connected ? shown : shown.map((card) => ({ ...card, alive: false }));
   const found = groups(current);
   return (

@@ -11,7 +11,7 @@ export interface Column {
 export interface Row {
   key: string | number;
   cells: readonly ReactNode[];
-  /** A part of the row above. */
+  /** Whether it is a part of the row above. */
   part?: boolean;
 }
 
@@ -19,7 +19,7 @@ interface TableProps {
   title: string;
   columns: readonly Column[];
   rows: readonly Row[];
-  /** It fits on a phone as it is. */
+  /** Whether it fits on a phone without conversion into blocks. */
   narrow?: boolean;
 }
 

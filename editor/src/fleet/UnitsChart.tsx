@@ -14,7 +14,7 @@ const HEIGHT = 180;
 const HOUR = 3600;
 const DAY = 24 * HOUR;
 
-/** Return the bars: their beginnings, all units, and the good ones that are drawn over them. */
+/** Return the bars: their start times, all units, and the good ones, which are drawn over them. */
 export function barsOf({ since, until, step, times }: FleetProduction): [number[], number[], number[]] {
   const known = new Map(times.map((each) => [each.at, each]));
   const [starts, all, good]: [number[], number[], number[]] = [[], [], []];

@@ -1,4 +1,4 @@
-/** Units of all cells: how many, which are bad and why, and where one with a serial number was made. */
+/** Units of all cells: counts, bad units with their reasons, and a search by serial number. */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
@@ -92,7 +92,7 @@ function Produced({ production }: { production: FleetProduction }) {
   );
 }
 
-/** Units by cell and, if wanted or if there is only one cell, by product and program. */
+/** Units by cell; also by product and program if the user wants it or chose one cell. */
 function ByCell({ production, single }: { production: FleetProduction; single: boolean }) {
   const [wanted, setWanted] = useState(false);
   const products = single || wanted;
@@ -141,7 +141,7 @@ function ByCell({ production, single }: { production: FleetProduction; single: b
   );
 }
 
-/** The bad units of the period, or units with a serial number whenever they were made. */
+/** The bad units of the period, or all units with a serial number, independent of the period. */
 function Units({ choice }: { choice: Choice }) {
   const [typed, setTyped] = useState("");
   const [opened, setOpened] = useState<FleetUnit | null>(null);
@@ -199,7 +199,7 @@ function Units({ choice }: { choice: Choice }) {
   );
 }
 
-/** Return why a unit is bad, as far as its record says it. */
+/** Return why a unit is bad, as far as its record contains it; an empty string for other units. */
 export function reasonOf({ unit }: Pick<FleetUnit, "unit">): string {
   if (unit.state !== "bad" && unit.state !== "rejected") return "";
   if (unit.error) return `${unit.step}: ${translate(unit.message ?? { text: unit.error }, unit.translations)}`;

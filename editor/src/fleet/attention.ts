@@ -1,4 +1,4 @@
-/** Which cells need attention, and why. */
+/** The attention that cells need, with the reasons. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -65,13 +65,13 @@ export function reasonOf({ alive, conflict, seen, state }: FleetCard): string {
   return "";
 }
 
-/** Return who controls the cell: the PLC, who started the program, or who has locked something. */
+/** Return the clients in control of the cell: the PLC, or the users who started the program or hold locks. */
 export function controlOf({ authority, started_by, controlling }: FleetState): string {
   if (authority === "plc") return t`PLC`;
   return [...new Set([started_by, ...controlling].filter(Boolean))].join(", ");
 }
 
-/** Return the cards of each level that has some, by name. */
+/** Return the cards by level, sorted by name; levels without cards are left out. */
 export function groups(cards: Iterable<FleetCard>): [Level, FleetCard[]][] {
   const sorted = [...cards].sort((one, other) => compared(one.name, other.name) || compared(one.id, other.id));
   const found = LEVELS.map((level): [Level, FleetCard[]] => [level, sorted.filter((card) => levelOf(card) === level)]);

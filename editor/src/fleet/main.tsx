@@ -1,4 +1,4 @@
-/** Entry of the page with all cells, which the server of the fleet serves. It only shows: it sends no command. */
+/** Entry of the page with all cells, which the server of the fleet serves. It shows states and sends no commands. */
 
 import { createRoot } from "react-dom/client";
 import { isLanguage, loadCatalogue, preferredLanguage } from "../i18n/catalogue";

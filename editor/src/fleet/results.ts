@@ -1,4 +1,4 @@
-/** What the server of the fleet has stored: requests, periods, and counts per cell. */
+/** Results that the server of the fleet has stored: requests, periods, and counts per cell. */
 
 import { t } from "@lingui/core/macro";
 import { saveAs } from "../commands/files";
@@ -51,7 +51,7 @@ async function load<Data>(path: string, query: Query): Promise<Data> {
   return (await rest(`/api/fleet/${path}?${words}`)).json();
 }
 
-/** Return the place of an entry, after which the next page begins; empty for the first page. */
+/** Return the position of an entry, after which the next page begins; empty for the first page. */
 const placeOf = (last?: { at: number; id: number }) => (last ? `${last.at}-${last.id}` : "");
 
 export const loadProduction = (query: Query) => load<FleetProduction>("production", query);

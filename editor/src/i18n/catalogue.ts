@@ -18,9 +18,9 @@ const CATALOGUES: Readonly<Record<Language, () => Promise<{ messages: Messages }
   cs: () => import("./cs.po"),
   de: () => import("./de.po"),
 };
-/** The language of the source code, which the server needs not translate. */
+/** The language of the source code, for which the server has no translations. */
 const FALLBACK: Language = "en";
-/** Time limit, s. The page is shown after it, with the server's texts in English. */
+/** Time limit for loading the server's translations, s. After it, the page shows the server's texts in English. */
 const TRANSLATIONS_DEADLINE = 5;
 
 export function isLanguage(name: unknown): name is Language {

@@ -1,4 +1,4 @@
-/** Choices whose texts are constants. */
+/** Options of fields whose texts are message descriptors. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 

@@ -21,8 +21,8 @@ export const OPERATORS: Record<string, Operator[]> = {
 };
 
 /**
- * Return the fields of a connection for comparisons. A result that is equal to a value is a condition as all clients
- * know it.
+ * Return the fields of a connection for comparisons. One result that equals a constant becomes a `condition`, which all
+ * clients understand.
  */
 export function fieldsOf(
   doc: OpenDocument,

@@ -19,7 +19,7 @@ export function detailOf(doc: OpenDocument, action: Of<Action>): string {
   const called = calledBy(doc, action);
   if (called) return t`function ${called.name}`;
   const object = doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?";
-  // An action of a function is on no point, but it may use one.
+  // Actions of a function belong to no point, but may use one.
   if (scopeOf(doc) && !pointUsed(doc, action)) return object;
   const point = doc.points[action.pointId]?.name ?? "?";
   return t`${object} at ${point}`;
@@ -34,7 +34,7 @@ export function callsOf(doc: OpenDocument, id: string): { action: Of<Action>; wi
   );
 }
 
-/** Return whether a call of a function in what is open would make a function call itself. */
+/** Return whether a call of this function from the open one would be recursive. */
 export function recursive(doc: OpenDocument, id: string): boolean {
   const open = scopeOf(doc);
   const reaches = (from: string): boolean =>
@@ -81,7 +81,7 @@ export const usersOfParameter = ({ actions }: OpenFunction, name: string): Of<Ac
     action.parameters.some((each) => each.type === PASSED_ON && decoded(each.value) === name),
   );
 
-/** Return whether an action runs on all paths from Start to End of what is open. */
+/** Return whether an action runs on all paths from Start to End of the open program or function. */
 export function onAllPaths(doc: OpenDocument, id: string): boolean {
   const seen = new Set([START, id]);
   const waiting = [START];

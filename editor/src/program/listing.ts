@@ -37,7 +37,7 @@ export function listingOf(doc: OpenDocument): Row[] {
     rows.push({ kind: "action", id, depth });
     for (const call of callsIn(doc, doc.actions[id] ?? {})) rows.push({ kind: "lane", id: call.id, depth: depth + 1 });
   };
-  /** What is still to be listed, the next one last: a row, or an action with what follows after its block. */
+  /** Rows and blocks still to be listed, the next one last. `next` of a block: the action after it. */
   const waiting: (Row | { kind: "block"; id: string; depth: number; next: string | null })[] = [];
   const later: typeof waiting = [];
   const block = (id: string, depth: number, next: string | null) => later.push({ kind: "block", id, depth, next });

@@ -22,7 +22,7 @@ import {
 export * from "./operands";
 export * from "./steps";
 
-/** Types of results that a condition of all clients can test. */
+/** Types of results that a `condition`, which all clients understand, can test. */
 export const BRANCHABLE: ReadonlySet<string> = new Set(["boolean", "integer", "integer_enum", "string_enum"]);
 
 function reached(doc: OpenDocument, from: string, next: (doc: OpenDocument, id: string) => string[]): Set<string> {
@@ -82,7 +82,7 @@ export function conditionActions(doc: OpenDocument, id: string): Of<Action>[] {
   return [own, ...others];
 }
 
-/** Return the results that a condition of all clients can test, for a connection from an action. */
+/** Return the results that a `condition` of a connection from an action can test. */
 export function conditionsOf(doc: OpenDocument, types: State["types"], id: string): Result[] {
   return conditionActions(doc, id)
     .flatMap((each) => resultsOf(doc, types, each))

@@ -26,7 +26,7 @@ export function actionNames(doc: OpenDocument): string[] {
   return bodies.flatMap(({ actions }) => Object.values(actions).map((each) => each.name));
 }
 
-/** Return the names of variables, parameters, stored results and errors, which have to be unique in what is open. */
+/** Return the names of variables, parameters, stored results and errors; unique in the open program or function. */
 export function outputNames(doc: OpenDocument): string[] {
   const variables = Object.values(doc.parameters).flatMap((each) => (each.variable ? [each.name] : []));
   const stored = Object.values(doc.actions).flatMap(({ flows, error_output }) => [

@@ -50,7 +50,7 @@ export function problemsOf(doc: OpenDocument, types: State["types"], reach: Stat
   return [...problemsIn(inScope(doc, []), types, reach), ...functions];
 }
 
-/** Return the problems of what is open. */
+/** Return the problems of the open program or function. */
 export const problemsHere = (doc: OpenDocument | null, problems: readonly Problem[]): Problem[] =>
   problems.filter((each) => doc !== null && each.scope === scopeOf(doc));
 

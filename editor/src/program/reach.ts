@@ -3,7 +3,7 @@
 import type { Action, Reach, ReachabilityData } from "../protocol/types";
 import { decoded } from "./decoded";
 
-/** From best to worst. */
+/** Reachabilities from best to worst. */
 export const REACHES: readonly Reach[] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];
 
 export const worse = (a: Reach, b: Reach): boolean => REACHES.indexOf(a) > REACHES.indexOf(b);

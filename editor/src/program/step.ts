@@ -25,7 +25,7 @@ export interface Step {
   device: string;
   /** The description of the action by its object type; empty if unknown. */
   does: string;
-  /** Its most telling parameters as text; empty if it has none. */
+  /** Its most important parameters as text; empty if it has none. */
   values: string;
   /** When it was announced, ms since 1970; undefined if unknown. */
   started: number | undefined;
@@ -82,7 +82,7 @@ function firstSentence(description = ""): string {
 }
 
 /**
- * Return the first values that the name and the point of an action do not already tell, with their units.
+ * Return the first values that the name and the point of an action do not already contain, with their units.
  *
  * `sent`: the values that the running action has received, in the order of its parameters; then results and variables
  * are shown by their values, not by their names, and left out while these are unknown.

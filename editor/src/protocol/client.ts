@@ -62,7 +62,7 @@ interface Waiting {
   done: () => void;
 }
 
-/** Time limits of requests, s: without and with device access. */
+/** Default time limit of a request, s. */
 export const DEADLINE = 15;
 const OPEN = 1;
 /** Close code for a missing or invalid token; a further attempt would fail too. */
@@ -113,7 +113,7 @@ export class ProtocolClient {
     this.connect();
   }
 
-  /** Give up the present connection, and open another one after a pause. */
+  /** Drop the current connection, and open another one after a pause. */
   reconnect(reason: string): void {
     const socket = this.detach();
     this.lost(1006, reason);
@@ -200,7 +200,7 @@ export class ProtocolClient {
     this.onState(state, reason, code);
   }
 
-  /** A pulled cable is not reported: after a silence the client sends a request, and disconnects without an answer. */
+  /** Check the connection after a silence, since a pulled cable is not reported: send a request, or reconnect. */
   private expectLife(): void {
     clearTimeout(this.watch);
     this.watch = setTimeout(() => {

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { type ServerMessage, translate } from "../i18n/serverMessages";
 
-/** The server refused a request. The message is meant for the user; `code` is the reason for programs. */
+/** The server refused a request. The message is for the user, `code` is the machine-readable reason. */
 export class Refused extends Error {
   override readonly name = "Refused";
   constructor(

@@ -30,8 +30,8 @@ export function nextCandidate(by: 1 | -1 = 1): void {
 }
 
 /**
- * Update the candidates with each frame; return a function that ends it. A chosen candidate is kept as long as it is
- * near the crosshair. `drawn` is called after each update.
+ * Update the candidates with each frame; return a function that stops it. A chosen candidate stays chosen as long as it
+ * is near the crosshair. `drawn` is called after each update.
  */
 export function followCrosshair(engine: Engine, drawn: () => void): () => void {
   let best = "";

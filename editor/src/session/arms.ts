@@ -27,7 +27,7 @@ export class RobotArms implements Follower {
       else if (!this.requested.has(id)) {
         this.requested.add(id);
         const several = state.types.robots[state.doc?.objects[id]?.type ?? ""]?.multi_arm ?? false;
-        // The request is refused if the robot has disconnected, and repeated when it is connected again.
+        // The server refuses it if the robot has disconnected. It is repeated when the robot is connected again.
         loadArms(id, several).then(
           (arms) =>
             store.setState((now) =>

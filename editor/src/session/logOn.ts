@@ -12,7 +12,7 @@ declare module "../store/runtime" {
   }
 }
 
-/** Kept for this page only, so that another person who opens the browser again has to log on. */
+/** Stored for this page only, so that another person who opens the browser again has to log on. */
 const KEY = "arcor2-hw.session";
 
 function store(session: string): void {
@@ -69,7 +69,7 @@ export async function logOn(args: LogOnArgs): Promise<void> {
 /** Log the person off; the log-on screen follows. */
 export const logOff = (): Promise<unknown> => call("LogOff");
 
-/** Process the data of LogOnChanged. `enter` starts again after a log-off. */
+/** Handle LogOnChanged. `enter` starts the log-on again after a log-off. */
 export function changed(data: LogOnChangedData, enter: () => void): void {
   setConnection({ role: ROLES[data.role] });
   if (data.person) return;

@@ -1,5 +1,5 @@
 /**
- * Keep this page in the session: connect, log in, request the data it shows, and do all that again after a reconnect.
+ * The session of this page: connect, log in, request the data that it shows, and repeat this after a reconnect.
  * Motion is never requested here.
  */
 

@@ -4,7 +4,7 @@ import type { Vector3 } from "three";
 import type { Hit } from "../engine/picking";
 import { now } from "../store/store";
 
-/** Handles a tap. Returns whether it did; then nothing is selected. */
+/** Handles a tap and returns true, or returns false so that the tap selects an item. */
 export type TapHandler = (hits: Hit[], floor: Vector3 | null) => boolean;
 
 declare module "../store/runtime" {
@@ -13,7 +13,7 @@ declare module "../store/runtime" {
   }
 }
 
-/** Pass the taps to a handler from now on. Return the function that ends it. */
+/** Pass the taps to a handler from now on. Return a function that removes the handler. */
 export function takeTaps(handler: TapHandler): () => void {
   const { runtime } = now();
   runtime.tapHandler = handler;

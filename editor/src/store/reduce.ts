@@ -30,7 +30,7 @@ export function notice(
   };
 }
 
-/** Reset what belongs to the open document. */
+/** The part of the state that belongs to the open document, without one. */
 const CLOSED = {
   doc: null,
   live: OFFLINE,

@@ -24,7 +24,7 @@ export interface Runtime {
   client?: ProtocolClient;
   /** Locks by the id of the item, followed by `/tree` for locks of a tree. */
   readonly locks: Map<string, HeldLock>;
-  /** Number of held motions since the page was opened. The server requires increasing numbers. */
+  /** Number of hold-to-run motions since the page was opened. The server requires increasing numbers. */
   holds: number;
   /** Save times of the documents whose thumbnail was requested. */
   readonly thumbnailTimes: Map<string, string>;

@@ -37,7 +37,7 @@ export function anyAction(doc: OpenDocument, id: string): OpenDocument["actions"
   return bodies.find((each) => id in each.actions)?.actions[id];
 }
 
-/** Return the actions of a function with the points above which they are shown; the same ones if these are the same. */
+/** Return the actions of a function with the points above which they are shown; the same object without a change. */
 function placed(doc: OpenDocument, { id, actions }: OpenFunction): OpenFunction["actions"] {
   const used = Object.values(actions).map((each) => pointUsed(doc, each));
   const call = Object.values(doc.program.actions).find((each) => each.type.startsWith(`${id}/`));

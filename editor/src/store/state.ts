@@ -51,14 +51,14 @@ export type ConnectionStatus = "left" | "connecting" | "person" | "joining" | "r
 
 export interface Connection {
   status: ConnectionStatus;
-  /** The reason why it is lost or refused, a sentence. */
+  /** Why the connection was lost or refused, as a sentence. */
   reason: string;
   /** The server refused the connection because of a missing or invalid token. */
   needsToken: boolean;
   user: string;
   /** Role from 1 to 5, given by the token and by the person who is logged on. */
   role: number;
-  /** Whether persons log on at this device, the session of the one who did, and after which idle time it ends, s. */
+  /** Whether persons log on at this device, the session of that person, and the idle time after which it ends, s. */
   shared: boolean;
   session: string;
   logOffAfter: number;
@@ -73,7 +73,7 @@ export interface Body {
   logic: Record<string, LogicItem>;
 }
 
-/** A function. An action of it is shown at the point that it uses, or at that of the action before. */
+/** A function. Each of its actions is shown at the point that it uses, or at the point of the preceding action. */
 export type OpenFunction = Omit<ProjectFunction, "actions" | "logic"> & Body;
 
 /** The open scene, and the project if one is open. */
@@ -92,7 +92,7 @@ export interface OpenDocument {
   logic: Record<string, LogicItem>;
   program: Body;
   functions: Record<string, OpenFunction>;
-  /** Ids of the functions that were opened one from the other; the last one is shown. Empty: the program is shown. */
+  /** Ids of the nested open functions, outermost first; the last one is shown. Empty: the program is shown. */
   path: readonly string[];
   parameters: Record<string, ProjectParameter>;
   /** By object, then by name of the parameter. */
@@ -160,9 +160,9 @@ export interface Program {
   /** Actions that are running. */
   running: string[];
   trace: TraceEntry[];
-  /** Its call stacks; null while it is not known. */
+  /** Call stacks of the program; null while they are unknown. */
   position: ProgramPosition | null;
-  /** The action at which the program is held; null if it is not. */
+  /** The failed action at which the program is held; null while it is not held. */
   held: HeldData | null;
   /** The run history of the server, newest first. */
   runs: Run[];

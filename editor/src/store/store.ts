@@ -29,7 +29,7 @@ export function setUi(change: Partial<Ui>): void {
   store.setState((state) => ({ ui: { ...state.ui, ...change } }));
 }
 
-/** Keep the unsaved form of an object or type; null: it is saved or reverted. */
+/** Store the unsaved form of an object or type; null removes it after it was saved or reverted. */
 export function keepForm(key: string, draft: FormDraft | null): void {
   const { [key]: _, ...others } = now().ui.forms;
   setUi({ forms: draft ? { ...others, [key]: draft } : others });
@@ -44,7 +44,7 @@ export function select(selection: Selection | null): void {
   setUi({ selection });
 }
 
-/** Show the last one of these functions in all views; without any, the program. */
+/** Show the last function of a path of nested functions in all views; the program if the path is empty. */
 export function show(path: readonly string[]): void {
   store.setState(({ doc, ui }) => ({
     doc: doc && inScope(doc, path),

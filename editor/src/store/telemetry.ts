@@ -80,13 +80,13 @@ export class Telemetry {
     return { joints: between, settled: false };
   }
 
-  /** Call a function with the robot's id on each report; return a function that ends it. */
+  /** Call a function with the robot's id on each report; return a function that unsubscribes it. */
   subscribe(listener: Listener): () => void {
     this.listeners.add(listener);
     return () => this.listeners.delete(listener);
   }
 
-  /** Forget everything: the scene went offline. */
+  /** Discard all telemetry, since the scene went offline. */
   clear(): void {
     const known = new Set([...this.joints.keys(), ...this.eefs.keys()]);
     this.joints.clear();

@@ -13,14 +13,14 @@ export interface Selection {
 /** View mode of the open project. */
 export type Mode = "3d" | "flow" | "split" | "code";
 
-/** A connection in progress: the next tap ends it. */
+/** A connection that is being drawn: the next tap selects its target. */
 export interface Connecting {
   from: string;
-  /** Its condition; by default a free one. */
+  /** Condition of the connection; by default one that no other connection uses. */
   condition?: ProjectLogicIf;
   /** The existing connection whose target is changed. */
   item?: string;
-  /** It becomes an error exit. */
+  /** Whether it becomes an error exit. */
   error?: boolean;
 }
 
@@ -41,10 +41,10 @@ export interface Draft {
   of: unknown;
   /** Pose in the frame in which it is stored. */
   pose: Pose;
-  /** Its previous type, and its new shape. */
+  /** The type of a resized item before the change, and its new shape. */
   type?: unknown;
   model?: ObjectModel;
-  /** The user is still changing it: events about the item do not end the draft. */
+  /** Whether the user is still changing it, so that events about the item do not end the draft. */
   continues?: boolean;
 }
 

@@ -83,7 +83,7 @@ export function measures(model: ObjectModel): Measure[] {
   ];
 }
 
-/** Return the distance of the centre from a surface on which the shape is placed. */
+/** Return the position of the centre of a shape that is placed at a point of a surface with this normal. */
 export function lifted(
   point: Position,
   normal: Position,

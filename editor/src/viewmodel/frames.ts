@@ -5,6 +5,7 @@ import type { OpenDocument } from "../store/state";
 
 export const ORIGIN: Pose = { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } };
 
+/** Return the product of two quaternions: the rotation `b`, then `a`. */
 export function times(a: Orientation, b: Orientation): Orientation {
   return {
     x: a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,

@@ -261,7 +261,7 @@ function hasFault(state: State, id: string): boolean {
   return connection === "lost" || connection === "failed" || health === "failure";
 }
 
-/** Return the reachability of an orientation by the best robot. */
+/** Return the reachability of each orientation by the best robot. */
 function bestReach(state: State): Record<string, Reach> {
   const best: Record<string, Reach> = {};
   for (const robot of Object.values(state.reach)) {

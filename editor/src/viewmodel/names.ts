@@ -55,7 +55,7 @@ export function selectionOf(state: State, id: string): Selection | null {
     logic: doc.logic,
   };
   for (const [kind, record] of Object.entries(kinds)) if (id in record) return { kind: kind as Kind, id };
-  // Outside of what is open.
+  // The item is in a program or function that is not open.
   if (pathTo(doc, id)) return { kind: anyAction(doc, id) ? "action" : "logic", id };
   return null;
 }

@@ -6,7 +6,7 @@ import type { OpenDocument, State } from "../store/state";
 import { worldOf } from "./frames";
 import { shapeOf } from "./shapes";
 
-/** Distances of Start and End from the action next to them, m, and the directions in which a place is sought. */
+/** Distances of Start and End from the action next to them, m, and the number of directions that are searched. */
 const DISTANCES = [0.2, 0.3, 0.45, 0.6, 0.9];
 const DIRECTIONS = 12;
 /** Distances to keep, m: from points with actions, from the middle of robots, and from other bodies. */
@@ -15,7 +15,7 @@ const ROBOT = 0.3;
 const BODY = 0.08;
 const HEIGHT = 0.02;
 
-/** Return the points whose actions lie around them: that of the selection, and all while a step is connected. */
+/** Return whether the actions of a point are arranged around it: at the selection, and at all while connecting. */
 export function isOpen({ ui, doc, program }: State): (pointId: string) => boolean {
   const id = ui.selection?.id ?? "";
   const step = placeOf(doc?.logic[id]?.start ?? id);
@@ -80,7 +80,7 @@ export function borders(doc: OpenDocument, types: State["types"]): Record<"START
     else if (!object.pose || shape.kind === "mesh") continue;
     else if (shape.kind === "box") {
       const [width, depth, height] = shape.size;
-      // Start and End may stand on plates.
+      // Start and End may be on plates.
       if (height < 0.1 * Math.min(width, depth)) continue;
       const { z, w } = object.pose.orientation;
       taken.push({ x, y, width, depth, yaw: 2 * Math.atan2(z, w), radius: BODY });

@@ -113,6 +113,7 @@ export function fitting(groups: ReadonlySet<string>, words: string): (row: Row) 
   };
 }
 
+/** Return the number of items in each group. */
 export function counts(rows: readonly Row[]): Record<Group, number> {
   const found = Object.fromEntries(GROUPS.map((group) => [group, 0])) as Record<Group, number>;
   for (const row of rows) found[row.group]++;

@@ -36,7 +36,7 @@ const DASHES: Record<LinkItem["branch"], number[] | null> = {
   value: [0.03, 0.02],
   error: [0.045, 0.012, 0.008, 0.012],
 };
-/** How far error exits bend to the side, as a part of their length and at most, m: another line may have their ends. */
+/** Sideways bend of error exits, as a part of their length, and at most, m: a step may have the same ends. */
 const ASIDE = [0.2, 0.1] as const;
 /** The position of the arrowhead, as a fraction of the line. */
 const HEAD = 0.86;

@@ -1,5 +1,5 @@
 /**
- * An action: a disc above its point; several of a point are stacked. START and END are where users put them. They keep
+ * An action: a disc above its point; several of a point are stacked. START and END have their own positions. Pucks keep
  * a minimum size on the screen, so that fingers can hit them.
  */
 

@@ -127,7 +127,7 @@ export class RobotThing extends Thing<RobotItem> {
       this.robot.joints[name]?.setJointValue(value);
     }
     if (first) this.paint();
-    // While it moves, joints and tip are not of the same time.
+    // While the robot moves, joints and end effector are reported for different times.
     if (still || !this.tool?.mounted) this.mountTool(this.robot);
     return !drawn.settled;
   }
@@ -197,7 +197,7 @@ export class RobotThing extends Thing<RobotItem> {
     this.material.color.copy(highlight ?? palette.robot);
     if (highlight) this.coloured.color.copy(highlight);
     else this.coloured.color.setRGB(1, 1, 1);
-    // Its joints are unknown: it is grey. Transparent parts would show through each other.
+    // A robot whose joints are unknown is grey. It is not transparent, since its parts would show through each other.
     const vague = this.stale || (this.robot !== null && this.shown.size === 0);
     for (const material of [this.material, this.coloured]) {
       if (vague) material.color.multiplyScalar(GREY);

@@ -59,7 +59,7 @@ export class ToolModel {
     return this.model?.step(seconds) ?? false;
   }
 
-  /** Put it between the flange and the tip, whose pose in the world is known. */
+  /** Attach the model to the flange so that it ends at the tip. */
   mount(flange: Object3D, tipInWorld: Matrix4): void {
     if (this.tip.parent !== flange) flange.add(this.tip);
     inverse.copy(flange.matrixWorld).invert().multiply(tipInWorld);

@@ -65,7 +65,7 @@ export function OffScreen({ engine }: { engine: Engine }) {
   );
 }
 
-/** Areas of controls that nothing else must cover, pixels in the view; without those of a control itself. */
+/** Return the areas of controls that nothing else may cover, pixels in the view; without the control `own`. */
 export function taken(view: DOMRect, own?: Element): Rect[] {
   return [...document.querySelectorAll(OTHERS)]
     .filter((each) => each !== own)

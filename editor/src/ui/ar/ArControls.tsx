@@ -1,4 +1,4 @@
-/** Controls of AR on the page: quality, freeze, markers, and the ways out. */
+/** Controls of AR on the page: quality, freeze, markers, placing, and leaving AR. */
 
 import { t } from "@lingui/core/macro";
 import { Suspense } from "react";
@@ -16,7 +16,7 @@ const SelectList = lazyComponent(() => import("./SelectList"));
 
 /** Time after which a rest is suggested, ms. */
 const REST = 30 * 60_000;
-/** Time after which a missing sight is worth a word, ms. */
+/** Time without a marker after which advice is shown, ms. */
 const STALE_AFTER = 1000;
 
 /** The word of a button; on a phone, only its icon is visible. */

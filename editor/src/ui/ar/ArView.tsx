@@ -13,7 +13,7 @@ const HeadsetPanel = lazyComponent(() => import("./HeadsetPanel"));
 export default function ArView({ engine }: { engine: Engine }) {
   const ar = useEditor((state) => state.ui.ar);
   useTicking(1);
-  // Before the view is closed.
+  // A layout effect leaves AR before the view is closed.
   useLayoutEffect(() => () => leaveAr(), []);
   if (!ar) return null;
   return (

@@ -66,7 +66,7 @@ export function PlaceByHand({ engine, ar }: { engine: Engine; ar: Ar }) {
   );
 }
 
-/** Move the workplace with the fingers on the view; return a function that ends it. */
+/** Move the workplace with the fingers on the view; return a function that stops it. */
 function followFingers(view: HTMLElement): () => void {
   const fingers = new Map<number, Point>();
   const ending = new AbortController();

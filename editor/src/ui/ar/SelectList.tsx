@@ -1,4 +1,4 @@
-/** A list instead of the browser's own one of a `<select>`, which is not shown over an XR session. */
+/** A list that replaces the browser's list of a `<select>`, which is not shown over an XR session. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";

@@ -1,4 +1,4 @@
-/** Registration by touched points, as the user of a headset reads it. */
+/** Registration by touched points, with the instructions for the user of a headset. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -12,7 +12,7 @@ const CORNERS: readonly MessageDescriptor[] = [
   msg`lower left corner`,
 ];
 
-/** Let the user touch the known points. `show`: shows which point to touch; `end`: with why it failed, or "". */
+/** Let the user touch the known points. `show` shows instructions; `end` is called with why it failed, or "". */
 export function touchPoints(view: XrArSession, show: (what: string) => void, end: (failure: string) => void): void {
   const known = knownPoints(view.places);
   const next = (number: number) => {

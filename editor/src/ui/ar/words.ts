@@ -40,7 +40,7 @@ export function gradeOf(ar: Ar): { word: string; shape: string; look: string } {
   return { word: t`Rough`, shape: "△", look: "rough" };
 }
 
-/** Return what only concerns devices that track themselves. */
+/** Return the advice that only concerns devices that track themselves; an empty string if there is none. */
 function xrAdviceOf({ phase, mode, configured, touched, pictures, drifted, grade }: Ar): string {
   if (phase === "lost") return t`The device has lost its position. Move it slowly, in good light.`;
   if (phase === "hand") return t`The device tracks its own position. Check the overlay from time to time.`;

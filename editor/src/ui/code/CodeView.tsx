@@ -1,4 +1,4 @@
-/** The Python program of the open project: read it, edit it, and import what was edited. */
+/** The Python program of the open project: read it, edit it, and import the changes. */
 
 import type { Diagnostic } from "@codemirror/lint";
 import { plural, t } from "@lingui/core/macro";
@@ -221,7 +221,7 @@ interface ScriptProps {
   onReady: (editor: CodeMirror | null) => void;
 }
 
-/** The script in a text editor; what is selected, running or a breakpoint is shared with the other views. */
+/** The script in a text editor; selection, running actions and breakpoints are shared with the other views. */
 function Script({ text, whyReadOnly, hidden, onEdit, check, onReady }: ScriptProps) {
   const host = useRef<HTMLDivElement>(null);
   const editor = useRef<CodeMirror | null>(null);

@@ -46,11 +46,11 @@ export interface Marks {
   selected: string;
   running: readonly string[];
   breakpoints: ReadonlySet<string>;
-  /** Names of ids. */
+  /** Return the name of an item by its id; an empty string if it is unknown. */
   nameOf: (id: string) => string;
 }
 
-/** What the editor reports. */
+/** Callbacks of the editor. */
 export interface Handlers {
   onEdit: (text: string) => void;
   onAction: (name: string) => void;

@@ -17,7 +17,7 @@ export interface Offer {
   info?: string;
   /** The inserted text, with fields as `${name}`. */
   snippet?: string;
-  /** It has the type of the parameter at the cursor. */
+  /** Whether it has the type of the parameter at the cursor. */
   fits?: boolean;
 }
 
@@ -217,7 +217,7 @@ const inString = (line: string): boolean =>
   (line.replace(/\\./g, "").match(/"/g) ?? []).length % 2 === 1 ||
   (line.replace(/\\.|"[^"]*"/g, "").match(/'/g) ?? []).length % 2 === 1;
 
-/** Return what follows a path such as `robot.` or `aps.feeder.poses.`. */
+/** Return the completions after a path such as `robot.` or `aps.feeder.poses.`. */
 function members(source: string, at: number, path: string[], doc: OpenDocument, types: State["types"]): Offer[] {
   const [first = "", name = "", group = "", ...deeper] = path;
   const property = (label: string, detail = ""): Offer => ({ label, type: "property", detail });

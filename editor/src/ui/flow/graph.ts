@@ -45,7 +45,7 @@ export interface Box {
   kind: "action" | "start" | "end" | "fold";
   name: string;
   detail: string;
-  /** Its most telling parameters as text; empty if it has none. */
+  /** Its most important parameters as text; empty if it has none. */
   values: string;
   /** Id of the function that it calls. */
   called?: string | undefined;

@@ -33,7 +33,7 @@ export function usePressed<T>(host: RefObject<HTMLElement | null>, latest: T, ta
       node = nodeOf(event);
     };
     const click = (event: Event) => {
-      // The target is the nearest common ancestor of the elements at the start and at the end of the press.
+      // The target of a click is the nearest common ancestor of the elements at the start and the end of the press.
       if (node === undefined || nodeOf(event) !== undefined) return;
       event.stopPropagation();
       onTap.current(node);

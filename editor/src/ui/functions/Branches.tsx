@@ -1,4 +1,4 @@
-/** The branches of parallel work: which function each one calls, its values; add, remove, or run them in turn. */
+/** The branches of parallel work: their functions and values; add and remove branches, or run them in turn. */
 
 import { t } from "@lingui/core/macro";
 import { addBranch, dissolveParallel, removeBranch } from "../../commands/parallel";

@@ -65,7 +65,7 @@ function Taken({ open, why }: { open: OpenFunction; why: string }) {
   );
 }
 
-/** Give a parameter the enumeration that an action takes, and pass it on to this action. Return why it was refused. */
+/** Set the type of a parameter to the enumeration of an action, and use it there. Return why it was refused. */
 const pass = async (name: string, { action, parameter, type, json }: EnumerationUse): Promise<string> =>
   (await updateFunctionParameter(name, { type }, json)) ||
   setParameter(action, { name: parameter, type: PASSED_ON, value: JSON.stringify(name) });

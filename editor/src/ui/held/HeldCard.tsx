@@ -18,7 +18,7 @@ import PartsCard from "../parts/PartsCard";
 import { ValueField } from "../program/ValueField";
 import "./held.css";
 
-/** Errors that say that the cell and the part inventory do not agree. */
+/** Errors that report a difference between the cell and the part inventory. */
 const PART_ERRORS: readonly string[] = ["place_occupied", "place_empty", "wrong_part", "part_unconfirmed"];
 /** Errors after which a device has to be connected again. */
 const LOST: readonly string[] = ["connection_lost", "not_connected"];
@@ -163,7 +163,7 @@ function Remedies({ held }: { held: HeldData }) {
   const why = whyUnavailable(state, "AcknowledgeStop");
   const records = useAlarms("retained") ?? [];
   const [refused, setRefused] = useState("");
-  const [done, setDone] = useState<string[]>([]); // what was acknowledged; the device reports it a little later
+  const [done, setDone] = useState<string[]>([]); // acknowledged alarms; the device reports them a little later
   const type = state.doc?.objects[held.device]?.type ?? "";
   const stops = state.types.robots[type]?.features?.acknowledge_stop === true;
   const present = (state.live.health[held.device]?.alarms ?? []).map(translatedAlarm);

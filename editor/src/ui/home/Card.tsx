@@ -47,7 +47,7 @@ const DO: Record<Entry["kind"], Partial<Record<ActionCommands, keyof Requests>>>
 interface CardProps {
   entry: Entry;
   marked: boolean;
-  /** Names of its kind. */
+  /** Existing names of this kind. */
   taken: string[];
   /** Show the related entries. */
   onRelated: (kind: Entry["kind"], search: string) => void;

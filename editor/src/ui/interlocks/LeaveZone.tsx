@@ -1,4 +1,4 @@
-/** Lets a robot leave a zone that it may not use, for example after a stop: slowly, and as long as a button is held. */
+/** Move a robot out of a zone that it may not use, for example after a stop: slowly, while a button is held. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

@@ -39,7 +39,7 @@ export interface ShownDevice {
   reason: string;
 }
 
-/** Return the name of a point for users: names of inputs and outputs are their own. */
+/** Return the name of a point for users. Names of inputs and outputs are not translated. */
 function nameOf({ name, use }: LivePoint): string {
   return use === "signal" ? words(translate({ text: name })) : name;
 }

@@ -1,4 +1,4 @@
-/** Form fields in panels: one of a few, a number with its unit, a slider, a switch. */
+/** Form fields in panels: toggle buttons, a select, a number with its unit, a slider, a switch. */
 
 import { t } from "@lingui/core/macro";
 import { type KeyboardEvent, type ReactNode, useId, useState } from "react";
@@ -15,7 +15,7 @@ interface OneOfProps<T extends string> {
   quiet?: boolean;
 }
 
-/** One of a few, next to each other. */
+/** A choice of one of a few options, as toggle buttons next to each other. */
 export function OneOf<T extends string>({ label, value, choices, onChange, quiet = false }: OneOfProps<T>) {
   const id = useId();
   return (
@@ -52,7 +52,7 @@ interface PickProps {
   isDisabled?: boolean;
 }
 
-/** One of many, as a native select. */
+/** A choice of one of many options, as a native select. */
 export function Pick({ label, value, choices, onChange, isDisabled = false }: PickProps) {
   const id = useId();
   return (

@@ -1,6 +1,6 @@
 /**
- * Let a press count if the page moved and not the finger. A card or an alarm that arrives between pressing and
- * releasing moves the button away; without this, the release would be outside of it and the press would be lost.
+ * Complete a press whose control moved away below a finger at rest. A card or an alarm that appears between pressing
+ * and releasing moves the button away; without this, the release would be outside of it and the press would be lost.
  */
 
 interface Point {

@@ -1,5 +1,5 @@
 /**
- * The operator's screen, at `/#/operator`: state of the machine, Start and Stop, and what went wrong. It needs the
+ * The operator's screen, at `/#/operator`: state of the machine, Start and Stop, alarms and failures. It needs the
  * operator role only. `/#/operator?kiosk` has no link to the editor.
  */
 
@@ -172,7 +172,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
           </Suspense>
         </aside>
       )}
-      {/* Above everything that comes and goes, so that these buttons keep their places. */}
+      {/* Above all content that appears and disappears, so that these buttons do not move. */}
       <div className="operator-buttons">
         {runs ? (
           <RunButtons whyNoResume={whyNoResume(cell)} />

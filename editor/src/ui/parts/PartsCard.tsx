@@ -230,7 +230,7 @@ function Inventory({
   );
 }
 
-/** Return why a program cannot continue. `missing`: without the result of which action; `present`: its package. */
+/** Return why a program cannot continue. `missing`: action whose result is missing; `present`: its package exists. */
 export function whyNot(missing: string, present: boolean): string {
   const start = t`Press Start to start it from its beginning.`;
   if (!present) return t`It cannot continue, because it was started from an open project, or its package was deleted.`;

@@ -9,7 +9,7 @@ export const MAX_GAP = 50;
 const SHORTEST = 4;
 
 /**
- * What happens with a key. `typed` are held keys of a person, which precede it. `late`: number of keys of the card that
+ * The decision about a key. `typed`: delayed keys of a person, which precede it. `late`: number of keys of the card that
  * have already been given to the page, since the page was too busy to read the next one in time.
  */
 export type Verdict = { hold: true } | { hold: false; typed: string } | { card: string; late: number };
@@ -50,7 +50,7 @@ export class CardKeys {
 
 /**
  * Call `onCard` with the number of each card that is read on this page, wherever the focus is. Keys of a person are
- * given to what has the focus, a little later. Return the function that ends it.
+ * passed to the focused element a little later. Return a function that stops reading.
  */
 export function readCards(onCard: (card: string) => void): () => void {
   const keys = new CardKeys();
@@ -67,7 +67,7 @@ export function readCards(onCard: (card: string) => void): () => void {
     if (!event.isTrusted) return; // given above
     if (event.ctrlKey || event.metaKey || event.altKey || event.isComposing || event.repeat) return;
     if (event.key === "Shift" || event.key === " ") return; // Shift: a reader types capitals with it
-    // The 3D view moves while a key is held, so that its keys must not be late.
+    // The 3D view moves while a key is held down, so its keys must not be delayed.
     const passes = event.target instanceof HTMLCanvasElement;
     clearTimeout(timer);
     const verdict = keys.key(event.key, event.timeStamp);

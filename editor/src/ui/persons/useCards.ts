@@ -4,14 +4,14 @@ import { readCards } from "./cardReader";
 
 declare module "../../store/runtime" {
   interface Runtime {
-    /** Receive the cards that are read; the newest one does. */
+    /** Callbacks for the cards that are read; only the last one is called. */
     cardTakers?: ((card: string) => void)[];
-    /** Ends the reading of cards. */
+    /** Stops reading cards. */
     endCards?: (() => void) | undefined;
   }
 }
 
-/** Call `onCard` with each card that is read while `active`. Of several, the component that was shown last gets it. */
+/** Call `onCard` with each card that is read while `active`. With several components, only the last one is called. */
 export function useCards(onCard: (card: string) => void, active = true): void {
   const latest = useRef(onCard);
   latest.current = onCard;

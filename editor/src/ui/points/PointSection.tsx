@@ -78,7 +78,7 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
 
 export default PointSection;
 
-/** Children are removed too; the server refuses to remove a point that is used. */
+/** Remove a point with its children. The server refuses to remove a point that is used. */
 export const RemovePoint: Section["Body"] = ({ selection: { id } }) => {
   const doc = useEditor((state) => state.doc);
   const why = useWhyNot(id, "RemoveActionPoint");

@@ -23,8 +23,8 @@ import { RefusedText, useRefusal } from "./Refusal";
 import "./points.css";
 
 /**
- * Return possible parents of a new point: the selected object or point, or that of the selected orientation, joints or
- * action.
+ * Return a possible parent of a new point: the selected object or point, or the point of the selected orientation,
+ * joints or action.
  */
 function parentOfSelection(): string {
   const { doc, ui } = now();
@@ -141,7 +141,7 @@ export default function PointsPanel() {
   );
 }
 
-/** The middle of the view, if there is a surface. */
+/** A crosshair in the middle of the view. */
 function Cross() {
   const view = theEngine() && document.querySelector(".view");
   return view && createPortal(<span className="aim-cross" aria-hidden="true" />, view);

@@ -2,7 +2,7 @@
 
 import { useState } from "react";
 
-/** Send a request and keep its refusal until the next request. */
+/** Return a function that sends a request, whether it is running, and its refusal until the next request. */
 export function useRefusal(): { refused: string; busy: boolean; ask: (work: Promise<string>) => Promise<boolean> } {
   const [refused, setRefused] = useState("");
   const [busy, setBusy] = useState(false);

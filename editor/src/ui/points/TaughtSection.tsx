@@ -130,7 +130,7 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
   );
 };
 
-/** Selects it; the view highlights it under the pointer. */
+/** A button that selects an orientation or joints; the view highlights it under the pointer. */
 function Taught({ kind, id, name }: { kind: Kind; id: string; name: string }) {
   return (
     <Button

@@ -1,4 +1,4 @@
-/** The reason why this user cannot change an item of the open document now. */
+/** Return why this user cannot change an item of the open document now; an empty string if they can. */
 
 import { t } from "@lingui/core/macro";
 import type { Requests } from "../../protocol/types";

@@ -1,4 +1,4 @@
-/** Records of units by serial number, and what the cell has produced. */
+/** Records of units by serial number, and the production of the cell. */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";

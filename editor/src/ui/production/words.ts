@@ -1,4 +1,4 @@
-/** Names of the states of recipes and units, and of what the cell does. */
+/** Names of the states of recipes and units, and of the activities of the cell. */
 
 import type { MessageDescriptor } from "@lingui/core";
 import { msg } from "@lingui/core/macro";

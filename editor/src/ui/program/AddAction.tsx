@@ -1,6 +1,6 @@
 /**
- * All actions by device, with search and recently used ones. One tap adds an action and connects it after the selected
- * one. Actions in space get the next taught point, or a new one at the crosshair; the others need no point.
+ * All actions by device, with search and recently used ones. A tap adds an action and connects it after the selected
+ * one. Actions in space use the next taught point, or a new one at the crosshair; the others need no point.
  */
 
 import { t } from "@lingui/core/macro";

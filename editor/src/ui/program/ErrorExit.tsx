@@ -1,4 +1,4 @@
-/** An error exit: its ends, the kinds of errors that it is for, and the name of the error. */
+/** An error exit: its ends, its kinds of errors, and the name of the error. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";

@@ -8,7 +8,7 @@ const AHEAD = 600;
 const MANY = 200;
 const STEP = 100;
 
-/** Return the place of the upper edge of a row; of the number of rows, the height of the list. */
+/** Return the position of the upper edge of a row; for the index after the last row, the height of the list. */
 export const at = (tops: Float64Array, index: number): number => tops[index] ?? 0;
 
 /** Return the first row whose lower edge is below a place. */

@@ -7,7 +7,7 @@ import type { Chosen } from "../../commands/robot";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 
-/** Hint that is shown before the first hold. */
+/** Hint that is shown before a hold-to-run button is pressed. */
 export const HOLD_HINT = msg`Motion stops as soon as you release the button.`;
 
 /** The element of the panel in which the pad is shown. */

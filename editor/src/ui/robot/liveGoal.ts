@@ -37,7 +37,7 @@ export class LiveGoal {
     this.next();
   }
 
-  /** Cancel requests that wait, and ignore the running one. */
+  /** Cancel the waiting request, and ignore the answer of the running one. */
   forget(): void {
     this.wanted = null;
     this.ended = true;

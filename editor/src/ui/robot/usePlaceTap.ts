@@ -1,4 +1,4 @@
-/** While it is on, the next tap in the view returns a position instead of selecting. */
+/** While `on` is set, a tap in the view returns a position instead of selecting an item. */
 
 import { useEffect, useRef } from "react";
 import type { Position } from "../../protocol/types";

@@ -1,4 +1,4 @@
-/** The branches that are running at once: what each of them does, and a step of one while the others wait. */
+/** The branches that run in parallel: the action of each, and a button to step one while the others wait. */
 
 import { t } from "@lingui/core/macro";
 import { step } from "../../commands/run";

@@ -1,4 +1,4 @@
-/** Add a device: required settings first, the connection is tested before. What was typed stays until it is added. */
+/** Add a device: required settings first, with a test of the connection. Typed values stay until it is added. */
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";

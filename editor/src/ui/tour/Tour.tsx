@@ -1,4 +1,4 @@
-/** The guided tour: one sentence at a time over the view; it continues when the user has done it. */
+/** The guided tour: one instruction at a time over the view; it continues when the user has followed it. */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";

@@ -1,4 +1,4 @@
-/** The guided tours: what to do, and when it is done. Pure. */
+/** The guided tours: instructions, and how to detect that the user has followed them. Pure. */
 
 import type { MessageDescriptor } from "@lingui/core";
 import { msg } from "@lingui/core/macro";
@@ -99,7 +99,7 @@ export const STEPS: readonly TourStep[] = [
   PAUSE,
 ];
 
-/** Return the tour for a role: what its users do. */
+/** Return the tour for the tasks of a role. */
 export function stepsOf(role: number): readonly TourStep[] {
   if (role === ROLES.operator) return OPERATOR;
   if (role === ROLES.standard_user) return STANDARD_USER;

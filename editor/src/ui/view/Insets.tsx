@@ -1,4 +1,4 @@
-/** Small views of the surroundings of the selected item from above and from the side, on demand. Tap one to look so. */
+/** Small views of the surroundings of the selected item from above and from the side. A tap turns the view that way. */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";

@@ -8,7 +8,7 @@ import { now } from "../../store/store";
 /** Distance after which a touch is a drag, pixels. */
 const BEGINS = 6;
 
-/** Listen on the canvas; return a function that ends it. */
+/** Listen on the canvas; return a function that stops listening. */
 export function dragPucks(engine: Engine, canvas: HTMLCanvasElement): () => void {
   let held: {
     id: string;

@@ -17,7 +17,7 @@ export function pick(ids: readonly string[]): void {
     if (action) void import("../../commands/functions").then(({ pickAction }) => pickAction(action.id));
     return;
   }
-  // So every item can be selected.
+  // Picking again selects the next candidate, so that every item can be selected.
   const at = found.findIndex((each) => each.id === state.ui.selection?.id);
   const next = found[(at + 1) % Math.max(1, found.length)] ?? null;
   select(next);

@@ -12,7 +12,7 @@ import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
 import { useTheme } from "../settings/Settings";
 
-/** Which items a view shows, and what it does with its engine until the returned function is called. */
+/** The items that a view shows, and the function that starts to use its engine and returns one that stops it. */
 export interface Use {
   shown?: (item: Item) => boolean;
   begin: (engine: Engine, canvas: HTMLCanvasElement) => () => void;
