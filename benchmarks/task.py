@@ -1,6 +1,6 @@
 """Count the taps and the time of the task in docs/benchmarks.md, for `make bench-editor`.
 
-The task is done in the seat view, and in AR with the picture of a fake camera. Each gesture is one tap of one finger.
+The task is done in the 3D view, and in AR with the picture of a fake camera. Each gesture is one tap of one finger.
 The script taps as soon as the editor has answered, so its times compare the views; a person needs longer.
 """
 

@@ -2,10 +2,10 @@
 
 import { i18n } from "@lingui/core";
 import { afterEach, describe, expect, test } from "vitest";
-import { ago, byName, compared, decimal, decimalPoint, duration, fixed, numberFrom } from "./formats";
+import { ago, byName, compareTexts, decimal, decimalPoint, duration, fixed, numberFrom } from "./formats";
 import { setTranslations } from "./i18n/testing";
-import { read, textOf } from "./program/values";
-import { show, stepWords } from "./transform/amounts";
+import { parseValue, textOf } from "./program/values";
+import { amountText, stepWords } from "./transform/amounts";
 
 const use = (locale: string) => i18n.loadAndActivate({ locale, messages: {} });
 
@@ -20,14 +20,18 @@ describe.each(["cs", "de"])("in %s", (language) => {
       "-12",
       ",",
     ]);
-    expect([fixed(-0.001, 1), show(0.0125, "mm"), stepWords(0.0001, "length")]).toEqual(["0,0", "12,5", "0,1 mm"]);
+    expect([fixed(-0.001, 1), amountText(0.0125, "mm"), stepWords(0.0001, "length")]).toEqual([
+      "0,0",
+      "12,5",
+      "0,1 mm",
+    ]);
     expect([textOf("double", "1.5"), textOf("integer", "1500")]).toEqual(["1,5", "1500"]);
     expect([duration(0.25), duration(3.25), duration(59.7)]).toEqual(["250 ms", "3,3 s", "1 min 0 s"]);
   });
 
   test("shown numbers can be read again", () => {
     use(language);
-    expect(read("double", textOf("double", "1.5"))).toEqual({ json: "1.5" });
+    expect(parseValue("double", textOf("double", "1.5"))).toEqual({ json: "1.5" });
     expect(numberFrom(fixed(-1234.5, 2))).toBe(-1234.5);
   });
 });
@@ -51,7 +55,7 @@ test("both commas and points are accepted in numbers, but not two of them", () =
 
 test("names are in the order of a dictionary, and numbers in them by value", () => {
   use("cs");
-  expect(["Zebra", "chata", "Čáp", "cihla", "hora", "a10", "a9"].sort(compared)).toEqual([
+  expect(["Zebra", "chata", "Čáp", "cihla", "hora", "a10", "a9"].sort(compareTexts)).toEqual([
     "a9",
     "a10",
     "cihla",

@@ -4,17 +4,17 @@ import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 
 /** Largest number of decimals that Intl accepts; a double has no more significant ones. */
-const ALL = 20;
+const MAX_DECIMALS = 20;
 
 /** Return a function that creates each formatter once per language and key, since creating one is slow. */
-function perLanguage<Key, Made>(make: (language: string, key: Key) => Made): (key: Key) => Made {
-  const made = new Map<string, Made>();
+function perLanguage<Key, Formatter>(make: (language: string, key: Key) => Formatter): (key: Key) => Formatter {
+  const cache = new Map<string, Formatter>();
   return (key) => {
     const id = `${i18n.locale} ${key}`;
-    let found = made.get(id);
+    let found = cache.get(id);
     if (found === undefined) {
       found = make(i18n.locale, key);
-      made.set(id, found);
+      cache.set(id, found);
     }
     return found;
   };
@@ -42,7 +42,7 @@ export function fixed(value: number, digits: number): string {
 }
 
 /** Return a number with at most this many decimals, without trailing zeros. */
-export function decimal(value: number, digits = ALL): string {
+export function decimal(value: number, digits = MAX_DECIMALS): string {
   return short(digits).format(value);
 }
 
@@ -64,11 +64,11 @@ export function numberFrom(text: string): number {
 
 /** Compare names as a dictionary does, and numbers in them by value. */
 export function byName(one: { name: string }, other: { name: string }): number {
-  return compared(one.name, other.name);
+  return compareTexts(one.name, other.name);
 }
 
 /** Compare texts as a dictionary does, and numbers in them by value. */
-export function compared(one: string, other: string): number {
+export function compareTexts(one: string, other: string): number {
   return order("names").compare(one, other);
 }
 

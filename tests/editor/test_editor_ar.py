@@ -307,7 +307,7 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         assert "unchecked" not in await quality.inner_text()
         await page.evaluate("() => { const now = Date.now(); Date.now = () => now + 31 * 60_000; }")
         await screen.sees("You have used AR for half an hour.")
-        await screen.press("Seat view")
+        await screen.press("3D view")
         await page.get_by_role("button", name="Show all").wait_for()
         assert await page.evaluate("window.__engine.view.viewpoint") != before
         assert await page.get_by_role("button", name=texts.SETTINGS).is_visible()

@@ -242,7 +242,7 @@ async def test_selection_out_of_view_is_found_and_objects_are_faded(opened: Open
         await page.get_by_text("Lines from points to their parents").click()
         with_parent = sum(1 for each in opened.project.action_points if each.parent)
         await screen.until("count => __engine.parentLines.count === count", with_parent)
-        await page.evaluate("__engine.view.look('top')")
+        await page.evaluate("__engine.view.lookFrom('top')")
         opaque = await _colour_of(screen, table)
         await page.get_by_role("slider", name="Transparency of objects").press("End")
         await screen.until("id => __engine.item(id).faint === 0.95", table)

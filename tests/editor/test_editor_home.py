@@ -77,7 +77,7 @@ async def test_scenes_are_created_renamed_described_copied_and_deleted(
 
         await choose_from_menu(screen, "Cell 2", "Describe…")
         await screen.page.get_by_label("Description of Cell 2").fill("For trials.")
-        await screen.press("Keep")
+        await screen.press("Save")
         await until(lambda: _described(client, "For trials."), "the description is stored")
         await expect(screen.page.locator(".card p.description").filter(has_text="For trials.")).to_be_visible()
         second = next(each for each in await client.call("ListScenes") if each.name == "Cell 2")

@@ -141,7 +141,7 @@ async def test_diagnosis_file_is_saved(server: ServerProcess, browser: Browser) 
         assert (client["user"], client["status"]) == ("Dora", "ready")
         # The log of the page: the connection and the first event.
         assert {"event ShowMainScreen", "connection open"} <= {
-            f"{e['what']} {e['text'].split()[0]}" for e in client["seen"]
+            f"{e['kind']} {e['text'].split()[0]}" for e in client["seen"]
         }
         assert await screen.barriers() == []
 

@@ -223,7 +223,7 @@ async def test_error_exit_is_added_in_the_graph_and_its_error_used(work: Work) -
     await graph.locator('.react-flow__node[aria-label^="grab,"] .flow-name').click()
     await work.panel.locator(".next-step", has_text="on error").click()
     # The user selects kinds of errors by name, and the edge shows their number.
-    for kind in ("Refused", "Not done in time"):
+    for kind in ("Refused", "Timeout"):
         await work.panel.locator(".kinds .chip", has_text=kind).click()
         changed = (await work.next_event("LogicItemChanged")).data
     assert changed.error_kinds == ["refused", "device_timeout"]

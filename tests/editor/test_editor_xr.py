@@ -157,7 +157,7 @@ async def test_tablet_tracks_its_pose_and_markers_correct_it(server: ServerProce
         await screen.picture("xr phone")
         await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
         await screen.settle()
-        # The seat view keeps the selection and the viewpoint.
+        # The 3D view keeps the selection and the viewpoint.
         await screen.tap(box)
         await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
         # Read the viewpoint at the click, because a marker may correct the view before it.
@@ -165,7 +165,7 @@ async def test_tablet_tracks_its_pose_and_markers_correct_it(server: ServerProce
             "() => addEventListener('click', () => { window.__eye = __engine.view.camera.position.toArray(); },"
             " { capture: true, once: true })"
         )
-        await screen.press("Seat view")
+        await screen.press("3D view")
         await page.get_by_role("button", name="Show all").wait_for()
         await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
         assert await page.evaluate("__engine.view.viewpoint.position") == pytest.approx(

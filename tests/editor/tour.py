@@ -103,7 +103,7 @@ class Tour:
         async for shown in self._dialog("messages"):
             yield shown
         await self._button(texts.SETTINGS).click()
-        await page.get_by_role("menuitem", name=words("Who did what"), exact=True).click()
+        await page.get_by_role("menuitem", name=words("Audit trail"), exact=True).click()
         await page.get_by_role("dialog").get_by_role("listitem").first.wait_for()
         async for shown in self._dialog("audit trail"):
             yield shown

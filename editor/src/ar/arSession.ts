@@ -2,7 +2,7 @@
 
 import type { Engine } from "../engine/engine";
 import type { Ar } from "../store/ui";
-import { Backdrop, pictured, placed } from "./backdrop";
+import { Backdrop, pictureFromView, pictureSize } from "./backdrop";
 import { type Mat3, mean, norm, type Point, sub, type Vec3 } from "./geometry";
 import { Gyro, turnedView } from "./gyro";
 import { type FocalLength, KNOWN, lensOf } from "./lens";
@@ -17,15 +17,15 @@ import {
   movedPoint,
   movedView,
   type Placement,
-  sightOf,
   stepTowards,
   tilted,
   UNMOVED,
   viewFrom,
+  viewpointOf,
 } from "./placing";
 import type { View } from "./pose";
 import { JUMP, jumpBetween } from "./registration";
-import { Sharing } from "./sharing";
+import { CameraReporter } from "./sharing";
 import { ArProblem, obstacleOfError } from "./support";
 import type { Found } from "./tracker";
 
@@ -114,7 +114,7 @@ export class ArSession implements ArMode {
   private placeLater = false;
   /** Correction of the views from markers by the user. */
   private nudge: Movement;
-  private readonly sharing: Sharing;
+  private readonly sharing: CameraReporter;
   private phase: Ar["phase"] = "looking";
   private reportedAt = 0;
   private correction = { size: 0, at: 0 };
@@ -130,7 +130,7 @@ export class ArSession implements ArMode {
     this.camera = `${track?.label} ${Math.max(width, height)} × ${Math.min(width, height)}`;
     this.middles = [...options.layout.places.values()].map(({ corners }) => mean(corners));
     this.nudge = options.placement(this.camera).nudge ?? UNMOVED;
-    this.sharing = new Sharing((camera) => options.report({ camera }));
+    this.sharing = new CameraReporter((camera) => options.report({ camera }));
     if (track) track.onended = () => this.ended || options.ended();
     this.video.muted = true;
     this.video.playsInline = true;
@@ -185,7 +185,7 @@ export class ArSession implements ArMode {
     const { shown } = this;
     if (!shown?.view) return;
     const size = this.options.engine.shown();
-    const inPicture = (point: Point) => pictured(point, shown.found, size);
+    const inPicture = (point: Point) => pictureFromView(point, shown.found, size);
     const movement = dragged(from.map(inPicture), to.map(inPicture), shown.view, shown.lens);
     if (movement) this.move(movement);
   }
@@ -200,7 +200,7 @@ export class ArSession implements ArMode {
 
   keepPlacement(): void {
     const { nudge, byHand, shown } = this;
-    const sight = byHand && shown?.view ? sightOf(shown.view) : this.options.placement(this.camera).sight;
+    const sight = byHand && shown?.view ? viewpointOf(shown.view) : this.options.placement(this.camera).sight;
     this.options.storePlacement(this.camera, { ...(sight && { sight }), ...(nudge !== UNMOVED && { nudge }) });
   }
 
@@ -223,7 +223,7 @@ export class ArSession implements ArMode {
     const { found } = this.shown ?? {};
     if (!found) return [0, 0];
     const { width, height } = this.options.engine.shown();
-    const { scale } = placed(found, { width, height });
+    const { scale } = pictureSize(found, { width, height });
     return [(x + 0.5 - found.width / 2) * scale + width / 2, (y + 0.5 - found.height / 2) * scale + height / 2];
   }
 

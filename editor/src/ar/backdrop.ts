@@ -11,25 +11,28 @@ const plane = new Matrix4();
 const pose = new Matrix4();
 
 /** The size of a picture in a view that it fills: scale, and pixels of the view. */
-export interface Placement {
+interface PictureSize {
   scale: number;
   width: number;
   height: number;
 }
 
 /** Return the size at which a picture fills a view; what exceeds the view is cut off at both sides. */
-export function placed(picture: { width: number; height: number }, view: { width: number; height: number }): Placement {
+export function pictureSize(
+  picture: { width: number; height: number },
+  view: { width: number; height: number },
+): PictureSize {
   const scale = Math.max(view.width / picture.width, view.height / picture.height);
   return { scale, width: picture.width * scale, height: picture.height * scale };
 }
 
 /** Return the point of a picture, pixels, for a point of the view that the picture fills. */
-export function pictured(
+export function pictureFromView(
   [x, y]: Point,
   picture: { width: number; height: number },
   view: { width: number; height: number },
 ): Point {
-  const { scale } = placed(picture, view);
+  const { scale } = pictureSize(picture, view);
   return [
     (x - view.width / 2) / scale + picture.width / 2 - 0.5,
     (y - view.height / 2) / scale + picture.height / 2 - 0.5,
@@ -59,7 +62,7 @@ export class Backdrop {
   /** Show the picture of the canvas with the items as seen from a view. `veil`: how much of the items is hidden. */
   show(view: View | null, lens: Lens, veil: number): void {
     const { width, height } = this.engine.shown();
-    const { scale, ...size } = placed(this.canvas, { width, height });
+    const { scale, ...size } = pictureSize(this.canvas, { width, height });
     const fov = (2 * Math.atan(height / (2 * scale * lens.focal)) * 180) / Math.PI;
     if (view) this.engine.view.follow(poseOf(view), fov);
     const { camera } = this.engine.view;

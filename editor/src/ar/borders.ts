@@ -4,7 +4,7 @@ import { area, type Point, type Quad } from "./geometry";
 import type { Grey } from "./grey";
 
 /** Points of a closed border: x, y, x, y … */
-export type Border = readonly number[];
+type Border = readonly number[];
 
 /** Fewest and most points of a border. */
 const SHORTEST = 30;

@@ -9,7 +9,7 @@ import { homography, type Point, type Quad } from "./geometry";
 import { type Grey, half, sample } from "./grey";
 
 /** A marker in a picture. Its corners are clockwise from the upper left one as printed. */
-export interface Sighting {
+export interface DetectedMarker {
   id: number;
   corners: Quad;
 }
@@ -26,9 +26,9 @@ const CELLS = 6;
 const SAMPLES = [0.35, 0.5, 0.65];
 
 /** Return the markers in a picture. `codes`: 16 bits by id; bit 15 is the upper left cell, 1 is white. */
-export function detect(picture: Grey, codes: ReadonlyMap<number, number>): Sighting[] {
+export function detect(picture: Grey, codes: ReadonlyMap<number, number>): DetectedMarker[] {
   const small = half(picture);
-  const found = new Map<number, Sighting & { contrast: number }>();
+  const found = new Map<number, DetectedMarker & { contrast: number }>();
   for (const border of outerBorders(darkPixels(small))) {
     const quad = quadOf(border);
     if (!quad) continue;

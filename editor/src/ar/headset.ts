@@ -19,7 +19,7 @@ import type { Ar } from "../store/ui";
 import { mean, norm, sub, type Vec3 } from "./geometry";
 import { Panel, type PanelButton } from "./panel";
 import type { Layout } from "./places";
-import type { Known } from "./touch";
+import type { KnownPoint } from "./touch";
 import { inverseOf, matrixOf } from "./xrView";
 
 /** Buttons of xr-standard gamepads that stop motion: A or X, and B or Y. */
@@ -64,7 +64,7 @@ interface Press {
 }
 
 interface Touching {
-  known: readonly Known[];
+  known: readonly KnownPoint[];
   points: Vec3[];
   /** Called before the next touch with its number, from 1. */
   next: (number: number) => void;
@@ -127,7 +127,7 @@ export class Headset {
     }
     this.panel.hover(hovered);
     if (!tracked) this.end();
-    this.hold();
+    this.continuePress();
   }
 
   /** Handle that the user can reach neither the panel nor the buttons. */
@@ -197,7 +197,7 @@ export class Headset {
   }
 
   /** Continue the pressed operations: move an item, or collect positions of the tip. */
-  private hold(): void {
+  private continuePress(): void {
     const { press } = this;
     if (!press) return;
     const ray = this.poses.get(press.source);

@@ -3,7 +3,7 @@
  * markers, but next to them: 3 % are 12 mm at a distance of 0.4 m.
  */
 
-import type { Sighting } from "./detector";
+import type { DetectedMarker } from "./detector";
 import { dot, norm, sub, type Vec3 } from "./geometry";
 import { eyeOf, fitView, type Lens, markerError, type Place, type Places, type View } from "./pose";
 
@@ -46,7 +46,7 @@ interface Size {
 }
 
 interface Shot {
-  seen: readonly Sighting[];
+  seen: readonly DetectedMarker[];
   eye: Vec3;
   direction: Vec3;
 }
@@ -59,7 +59,7 @@ export class LensLearner {
   constructor(private readonly places: Places) {}
 
   /** Use a view. Return a better focal length, and the markers that contradict the others; null if there is none. */
-  learn(seen: readonly Sighting[], view: View, before: FocalLength, { width, height }: Size): Learned | null {
+  learn(seen: readonly DetectedMarker[], view: View, before: FocalLength, { width, height }: Size): Learned | null {
     const size = `${Math.max(width, height)} × ${Math.min(width, height)}`;
     if (size !== this.size || !this.search) {
       this.size = size;
@@ -82,15 +82,15 @@ class LensSearch {
   ) {}
 
   /** Add a view if it differs from the others. Return whether it does. */
-  add(seen: readonly Sighting[], view: View): boolean {
+  add(seen: readonly DetectedMarker[], view: View): boolean {
     const known = seen.filter(({ id }) => this.places.has(id));
     if (known.length < 2) return false;
     const eye = eyeOf(view);
     const direction = view.turn[2];
-    const differs = this.shots.every(({ eye: other, direction: way }) => {
+    const differs = this.shots.every(({ eye: other, direction: otherDirection }) => {
       const factor = norm(eye) / Math.max(1e-6, norm(other));
       return (
-        Math.acos(Math.min(1, dot(direction, way))) > TURNED ||
+        Math.acos(Math.min(1, dot(direction, otherDirection))) > TURNED ||
         Math.max(factor, 1 / factor) > MOVED ||
         norm(sub(eye, other)) > 0.15
       );
@@ -140,7 +140,7 @@ class LensSearch {
   }
 
   /** Return the squared errors of all corners for a focal length, pixels². */
-  private cost(shots: readonly Sighting[][], places: Places, relative: number): number {
+  private cost(shots: readonly DetectedMarker[][], places: Places, relative: number): number {
     const lens = lensOf({ relative, deviation: 0 }, this.width, this.height);
     let sum = 0;
     for (const seen of shots) {

@@ -17,13 +17,13 @@ export interface PanelButton {
   label: string;
   /** Cells of a row of 12. */
   cells: number;
-  look?: "stop";
+  style?: "stop";
   disabled?: boolean;
   /** Called when it is pressed; a function that it returns is called on release. */
   press: () => unknown;
 }
 
-export interface PanelContent {
+interface PanelContent {
   title: string;
   lines: readonly string[];
   buttons: readonly PanelButton[];
@@ -156,9 +156,9 @@ export class Panel {
     write(title, GAP * 2, 0.022, 0.022, WIDTH - 4 * GAP, "left");
     lines.forEach((line, n) => write(line, GAP * 2, 0.052 + 0.024 * n, 0.017, WIDTH - 4 * GAP, "left"));
     for (const { button, left, top, width } of this.placed) {
-      const { look, disabled, id, label } = button;
+      const { style, disabled, id, label } = button;
       context.globalAlpha = disabled ? 0.4 : 1;
-      context.fillStyle = look ? "#c62828" : "#2b3642";
+      context.fillStyle = style ? "#c62828" : "#2b3642";
       context.fillRect(pixels(left), pixels(top), pixels(width), pixels(ROW - GAP));
       if (id === this.hovered) {
         context.lineWidth = pixels(0.003);
@@ -166,7 +166,7 @@ export class Panel {
         context.strokeRect(pixels(left), pixels(top), pixels(width), pixels(ROW - GAP));
       }
       context.fillStyle = "#ffffff";
-      write(label, left + width / 2, top + (ROW - GAP) / 2, look ? 0.026 : 0.02, width - 2 * GAP, "center");
+      write(label, left + width / 2, top + (ROW - GAP) / 2, style ? 0.026 : 0.02, width - 2 * GAP, "center");
     }
     context.globalAlpha = 1;
     this.texture.needsUpdate = true;

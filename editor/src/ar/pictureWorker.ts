@@ -29,10 +29,13 @@ interface Scope<Picture> {
   postMessage(message: FromWorker): void;
 }
 
-/** Answer the messages of the page. `look`: look for markers in the picture of a message; null if it has no pixels. */
+/**
+ * Answer the messages of the page. `process` finds the markers in the picture of a message; it returns null if the
+ * picture has no pixels.
+ */
 export function serve<Picture extends object>(
   newTracker: (setup: Setup) => Tracker,
-  look: (tracker: Tracker, picture: Picture) => Found | null,
+  process: (tracker: Tracker, picture: Picture) => Found | null,
 ): void {
   const scope = globalThis as unknown as Scope<Picture>;
   let tracker: Tracker | null = null;
@@ -40,7 +43,7 @@ export function serve<Picture extends object>(
     const began = performance.now();
     if ("setup" in data) tracker = newTracker(data.setup);
     else if (tracker) {
-      const found = look(tracker, data);
+      const found = process(tracker, data);
       if (found) scope.postMessage({ found, ms: performance.now() - began });
     }
   };

@@ -8,10 +8,10 @@ import {
   movedPoint,
   movedView,
   onFloor,
-  sightOf,
   stepTowards,
   tilted,
   viewFrom,
+  viewpointOf,
 } from "./placing";
 import { eyeOf, type Lens, projected } from "./pose";
 import { looking } from "./testing";
@@ -116,7 +116,7 @@ test("a camera that tilts upwards sees the workplace lower", () => {
 });
 
 test("placing starts from a stored sight, upright by the motion sensor if there is one", () => {
-  const sight = sightOf(VIEW);
+  const sight = viewpointOf(VIEW);
   const same = viewFrom(sight, null);
   close(same.turn.flat(), VIEW.turn.flat());
   close(eyeOf(same), eyeOf(VIEW));

@@ -23,14 +23,14 @@ export interface Movement {
 }
 
 /** Position of a camera and the point at which it looks. */
-export interface Sight {
+export interface Viewpoint {
   position: Vec3;
   target: Vec3;
 }
 
 /** The data stored by a device: the last view that was set by hand, and the correction of the view from markers. */
 export interface Placement {
-  sight?: Sight;
+  sight?: Viewpoint;
   nudge?: Movement;
 }
 
@@ -129,10 +129,10 @@ export function stepTowards(direction: Direction, size: { distance: number; angl
 
 /** Return the point of the floor in the middle of the picture, or a point 1 m ahead of the camera. */
 function ahead(view: View): Vec3 {
-  return onFloor([0, 0], view, { focal: 1, cx: 0, cy: 0 }) ?? sightOf(view).target;
+  return onFloor([0, 0], view, { focal: 1, cx: 0, cy: 0 }) ?? viewpointOf(view).target;
 }
 
-export function sightOf(view: View): Sight {
+export function viewpointOf(view: View): Viewpoint {
   const position = eyeOf(view);
   return { position, target: add(position, view.turn[2]) };
 }
@@ -143,7 +143,7 @@ export function sightOf(view: View): Sight {
  * @param orientation orientation of the camera by the motion sensor; with it, the vertical of the workplace is that of
  *     the sensor, and the camera has the same target at the same distance.
  */
-export function viewFrom({ position, target }: Sight, orientation: Mat3 | null): View {
+export function viewFrom({ position, target }: Viewpoint, orientation: Mat3 | null): View {
   const sight = sub(target, position);
   const forward = unit(sight);
   const right = unit(cross(forward, UP));

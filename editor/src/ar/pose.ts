@@ -1,6 +1,6 @@
 /** The pose of the camera from corners of markers at known places: all corners in one least-squares problem. */
 
-import type { Sighting } from "./detector";
+import type { DetectedMarker } from "./detector";
 import {
   add,
   apply,
@@ -78,7 +78,7 @@ export function projected(world: Vec3, { turn, shift }: View, lens: Lens): Point
 }
 
 /** Return the squared distances of the corners of a marker from where they are expected, pixels². */
-export function markerError({ corners }: Sighting, place: Place, view: View, lens: Lens): number {
+export function markerError({ corners }: DetectedMarker, place: Place, view: View, lens: Lens): number {
   let sum = 0;
   corners.forEach((seen, i) => {
     const expected = projected(place.corners[i] as Vec3, view, lens);
@@ -91,7 +91,7 @@ export function markerError({ corners }: Sighting, place: Place, view: View, len
  * Return the view that fits best to markers, null without one. A flat marker permits two views, so both are tried;
  * with `near`, only views close to it.
  */
-export function fitView(seen: readonly Sighting[], places: Places, lens: Lens, near?: View): FittedView | null {
+export function fitView(seen: readonly DetectedMarker[], places: Places, lens: Lens, near?: View): FittedView | null {
   const known = seen.filter(({ id }) => places.has(id));
   const matches = known.flatMap(({ id, corners }) =>
     corners.map((corner, i): Match => ({ world: (places.get(id) as Place).corners[i] as Vec3, seen: corner })),

@@ -139,7 +139,7 @@ test("the focal length is found while the camera moves, and unchecked before", (
     [-1.3, 0.7],
   ];
   const found: Found[] = [];
-  for (const [angle, distance] of steps) found.push(tracker.look(picture(from(angle, distance))));
+  for (const [angle, distance] of steps) found.push(tracker.process(picture(from(angle, distance))));
   expect(found[0]?.checked).toBe(false);
   expect(found[0]?.registration?.grade).toBe("rough");
   const last = found.at(-1) as Found;
@@ -167,7 +167,7 @@ test("a misplaced marker does not spoil the focal length", () => {
     [-0.9, 1.2],
     [-1.3, 0.7],
   ] as const) {
-    last = tracker.look(picture(from(angle, distance)));
+    last = tracker.process(picture(from(angle, distance)));
   }
   expect(last?.registration?.contradicting).toEqual([12]);
   expect(Math.abs((last?.focal.relative ?? 0) / RELATIVE - 1)).toBeLessThan(0.01);
@@ -179,11 +179,11 @@ test("the reason of a loss is known", () => {
     new LensLearner(LAYOUT.places),
   );
   const view = from(-1.2, 1.1);
-  expect(tracker.look(picture(view)).loss).toBeNull();
-  expect(tracker.look(picture(view, { white: 24, black: 8, noise: 1 })).loss).toBe("dark");
-  expect(tracker.look(picture(view, { blur: 12, noise: 1 })).loss).toBe("blurred");
+  expect(tracker.process(picture(view)).loss).toBeNull();
+  expect(tracker.process(picture(view, { white: 24, black: 8, noise: 1 })).loss).toBe("dark");
+  expect(tracker.process(picture(view, { blur: 12, noise: 1 })).loss).toBe("blurred");
   const away = looking([0.2, -0.8, 0.7], [0.2, -3, 0.7]);
-  expect(tracker.look(picture(away, { noise: 12 })).loss).toBe("unseen");
+  expect(tracker.process(picture(away, { noise: 12 })).loss).toBe("unseen");
 });
 
 test("a view that moved is noticed", () => {

@@ -1,6 +1,6 @@
 /** The pose of the camera in the workplace from what one picture shows, with its quality. */
 
-import type { Sighting } from "./detector";
+import type { DetectedMarker } from "./detector";
 import { add, apply, mean, norm, solve, sub, type Vec3 } from "./geometry";
 import {
   dependence,
@@ -48,7 +48,7 @@ export const FAIR = 0.012;
 export const JUMP = 0.01;
 
 /** The known state before a picture is analysed. */
-export interface Knowledge {
+interface Knowledge {
   /** Standard deviation of the focal length, relative, and whether the focal length counts as known. */
   deviation: number;
   known: boolean;
@@ -60,7 +60,7 @@ export interface Knowledge {
 
 /** Return the registration by the markers of a picture; null without a configured marker. */
 export function register(
-  seen: readonly Sighting[],
+  seen: readonly DetectedMarker[],
   places: Places,
   lens: Lens,
   { deviation, known, excluded = [], near }: Knowledge,
@@ -87,7 +87,11 @@ export function register(
 }
 
 /** Leave out the marker without which the others fit best. */
-function withoutOne(used: readonly Sighting[], places: Places, lens: Lens): { id: number; view: FittedView } | null {
+function withoutOne(
+  used: readonly DetectedMarker[],
+  places: Places,
+  lens: Lens,
+): { id: number; view: FittedView } | null {
   const found = used
     .map(({ id }) => ({
       id,
@@ -103,7 +107,7 @@ function withoutOne(used: readonly Sighting[], places: Places, lens: Lens): { id
 }
 
 /** Return the standard deviation of the overlay 0.5 m from the markers, m: the largest one of five directions. */
-function overlayError(used: readonly Sighting[], places: Places, lens: Lens, view: FittedView): number {
+function overlayError(used: readonly DetectedMarker[], places: Places, lens: Lens, view: FittedView): number {
   const count = 2 * view.corners;
   const variance = Math.max(FINEST ** 2, (view.rms ** 2 * view.corners) / Math.max(1, count - 6));
   const middle = mean(used.map(({ id }) => mean((places.get(id) as Place).corners)));
@@ -143,7 +147,12 @@ export function jumpBetween(before: View, after: View, points: readonly Vec3[]):
 }
 
 /** Return the root mean square error of each marker, pixels, for the diagnostics. */
-export function markerErrors(seen: readonly Sighting[], places: Places, view: View, lens: Lens): Map<number, number> {
+export function markerErrors(
+  seen: readonly DetectedMarker[],
+  places: Places,
+  view: View,
+  lens: Lens,
+): Map<number, number> {
   const errors = new Map<number, number>();
   for (const each of seen) {
     const place = places.get(each.id);

@@ -1,12 +1,12 @@
 import { expect, test, vi } from "vitest";
 import type { Pose } from "../protocol/types";
 import { apply, rotationOf } from "./geometry";
-import { PERIOD, Sharing } from "./sharing";
+import { CameraReporter, PERIOD } from "./sharing";
 import { looking } from "./testing";
 
 test("the pose is reported at most twice a second, when it changes, and until it is unknown", () => {
   const report = vi.fn((_camera: Pose | null) => {});
-  const sharing = new Sharing(report);
+  const sharing = new CameraReporter(report);
   sharing.take(null, 0);
   expect(report).not.toHaveBeenCalled();
   sharing.take(looking([1, 0, 1], [0, 0, 0]), 0);

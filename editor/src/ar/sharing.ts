@@ -11,7 +11,7 @@ export const PERIOD = 500;
 const SHIFT = 0.01;
 const TURN = 0.02;
 
-export class Sharing {
+export class CameraReporter {
   private last: { view: View; at: number } | null = null;
 
   constructor(private readonly report: (camera: Pose | null) => void) {}

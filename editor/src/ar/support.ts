@@ -28,7 +28,7 @@ export class ArProblem extends Error {
 }
 
 /** The parts of the browser that AR needs. */
-export interface Abilities {
+interface Abilities {
   secure: boolean;
   camera: boolean;
   workers: boolean;

@@ -19,14 +19,14 @@ import type { Places } from "./pose";
 import { ASIDE, FAIR, GOOD, type Grade } from "./registration";
 
 /** A point whose position in the workplace is known. `corner` counts clockwise from the upper left one, from 0. */
-export interface Known {
+export interface KnownPoint {
   marker: number;
   corner: number;
   at: Vec3;
 }
 
 /** A fit, or the reason why there is none: the points are on a line, or those at `points` contradict the others. */
-export type Touched =
+export type TouchFit =
   | { workplace: Matrix4; error: number; grade: Grade }
   | { problem: "line" | "contradicting"; points: number[] };
 
@@ -39,11 +39,11 @@ const SIDE = 0.02;
 const TILT = 0.14;
 
 /** Return the three corners of markers that span the largest triangle; none with less than one marker. */
-export function knownPoints(places: Places): Known[] {
+export function knownPoints(places: Places): KnownPoint[] {
   const all = [...places].flatMap(([marker, { corners }]) =>
-    corners.map((at, corner): Known => ({ marker, corner, at })),
+    corners.map((at, corner): KnownPoint => ({ marker, corner, at })),
   );
-  let best: Known[] = [];
+  let best: KnownPoint[] = [];
   let largest = 0;
   for (const [i, a] of all.entries()) {
     for (const [j, b] of all.entries()) {
@@ -57,7 +57,7 @@ export function knownPoints(places: Places): Known[] {
 }
 
 /** Return the pose of the workplace in the frame of WebXR (y up) in which the points were touched. */
-export function fitTouched(known: readonly Vec3[], touched: readonly Vec3[]): Touched {
+export function fitTouched(known: readonly Vec3[], touched: readonly Vec3[]): TouchFit {
   if (heightOf(known) < LOWEST || heightOf(touched) < LOWEST) return { problem: "line", points: [0, 1, 2] };
   const wrong = misplaced(known, touched);
   if (wrong.length > 0) return { problem: "contradicting", points: wrong };

@@ -1,13 +1,13 @@
 /** Processing of a picture by the worker: detect markers, register the camera, and search for the focal length. */
 
-import { detect, type Sighting } from "./detector";
+import { type DetectedMarker, detect } from "./detector";
 import { type Grey, half } from "./grey";
 import { ASSUMED, type FocalLength, KNOWN, type LensLearner, lensOf } from "./lens";
 import type { Lens, Places, View } from "./pose";
 import { markerErrors, type Registration, register } from "./registration";
 
 /** The reason why no marker is found: darkness, a blurred picture, or another one. */
-export type Loss = "dark" | "blurred" | "unseen";
+type Loss = "dark" | "blurred" | "unseen";
 
 export interface Setup {
   /** Codes of the configured markers by id. */
@@ -20,7 +20,7 @@ export interface Setup {
 export interface Found {
   width: number;
   height: number;
-  seen: Sighting[];
+  seen: DetectedMarker[];
   registration: Registration | null;
   /** Errors of the markers, pixels, by id. */
   errors: ReadonlyMap<number, number>;
@@ -55,7 +55,7 @@ export class Tracker {
   }
 
   /** `lens`: the lens of the picture, if it is known. */
-  look(picture: Grey, lens: Lens | null = null): Found {
+  process(picture: Grey, lens: Lens | null = null): Found {
     const { width, height } = picture;
     this.stated = lens;
     if (lens) this.focal = { relative: lens.focal / Math.max(width, height), deviation: STATED };
@@ -69,7 +69,7 @@ export class Tracker {
     return this.found(picture, seen, this.register(seen, width, height));
   }
 
-  private register(seen: readonly Sighting[], width: number, height: number): Registration | null {
+  private register(seen: readonly DetectedMarker[], width: number, height: number): Registration | null {
     const { deviation } = this.focal;
     const options = { deviation, known: deviation <= KNOWN, excluded: this.excluded, near: this.last };
     return register(seen, this.setup.places, this.lensOf(width, height), options);
@@ -79,7 +79,7 @@ export class Tracker {
     return this.stated ?? lensOf(this.focal, width, height);
   }
 
-  private found(picture: Grey, seen: Sighting[], registration: Registration | null): Found {
+  private found(picture: Grey, seen: DetectedMarker[], registration: Registration | null): Found {
     const { width, height } = picture;
     const lens = this.lensOf(width, height);
     const { light, sharpness } = registration && this.sharp > 0 ? NOT_MEASURED : lightOf(half(picture));

@@ -28,6 +28,6 @@ serve(
   (setup) => new Tracker(setup, new LensLearner(setup.places)),
   (tracker, { bitmap }: Bitmap) => {
     const picture = read(bitmap);
-    return picture && tracker.look(picture);
+    return picture && tracker.process(picture);
   },
 );

@@ -12,7 +12,7 @@ import { type Eye, lensIn } from "./xrView";
 const PERIOD = 150;
 
 /** The time and the camera poses of a picture. */
-export interface Taken {
+export interface PictureOrigin {
   eyes: readonly (Eye & { viewport: XRViewport })[];
   camera: Matrix4;
   lens: Lens;
@@ -20,9 +20,9 @@ export interface Taken {
 }
 
 interface Handlers {
-  found: (found: Found, ms: number, taken: Taken) => void;
+  found: (found: Found, ms: number, taken: PictureOrigin) => void;
   /** Called with the picture that `captureNext` requested. */
-  kept: (picture: HTMLCanvasElement, taken: Taken) => void;
+  captured: (picture: HTMLCanvasElement, taken: PictureOrigin) => void;
   failed: () => void;
 }
 
@@ -36,10 +36,10 @@ export class XrPictures {
   private readonly pixels: CameraPixels;
   private readonly binding: CameraBinding;
   private readonly worker: Worker;
-  private taken: Taken | null = null;
+  private taken: PictureOrigin | null = null;
   private busy = false;
   private readAt = 0;
-  private keeps = false;
+  private captureRequested = false;
 
   constructor(
     session: XRSession,
@@ -59,18 +59,18 @@ export class XrPictures {
   }
 
   /** Pass the next picture to `captured`. */
-  keepNext(): void {
-    this.keeps = true;
+  captureNext(): void {
+    this.captureRequested = true;
   }
 
   /** Pass the picture that was read to the worker, and read the one of this frame when it is due. */
-  look(view: XRView, eyes: Taken["eyes"]): void {
+  process(view: XRView, eyes: PictureOrigin["eyes"]): void {
     const { camera } = view as CameraView;
     const now = performance.now();
     const pixels = this.busy ? null : this.pixels.take();
     if (pixels && this.taken) {
-      if (this.keeps) this.handlers.kept(canvasOf(pixels), this.taken);
-      this.keeps = false;
+      if (this.captureRequested) this.handlers.captured(canvasOf(pixels), this.taken);
+      this.captureRequested = false;
       this.busy = true;
       this.send({ pixels, lens: this.taken.lens }, [pixels.data.buffer]);
     }

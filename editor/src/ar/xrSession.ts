@@ -20,10 +20,10 @@ import {
   stepTowards,
   UNMOVED,
 } from "./placing";
-import { Sharing } from "./sharing";
-import type { Touched } from "./touch";
+import { CameraReporter } from "./sharing";
+import type { TouchFit } from "./touch";
 import type { Found } from "./tracker";
-import { type Taken, XrPictures } from "./xrPictures";
+import { type PictureOrigin, XrPictures } from "./xrPictures";
 import { cropped, inverseOf, lensIn, matrixOf, viewOf, workplaceIn, XrOutput } from "./xrView";
 import { XrWorkplace } from "./xrWorkplace";
 
@@ -67,7 +67,7 @@ export class XrArSession implements ArMode {
 
   private readonly local = new Scene();
   private readonly output: XrOutput;
-  private readonly sharing: Sharing;
+  private readonly sharing: CameraReporter;
   private readonly middles: readonly Vec3[];
   private space: XRReferenceSpace | null = null;
   private hits: XRHitTestSource | null = null;
@@ -76,7 +76,7 @@ export class XrArSession implements ArMode {
   private ended = false;
   private lastFrame = 0;
   private nudge: Movement = UNMOVED;
-  private eyes: Taken["eyes"] = [];
+  private eyes: PictureOrigin["eyes"] = [];
   private viewer = matrixOf([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
   private placesNext = false;
   private frozen: FrozenPicture | null = null;
@@ -93,7 +93,7 @@ export class XrArSession implements ArMode {
     const { scene, renderer } = engine;
     this.mode = hasOverlay(session) ? "tablet" : "headset";
     this.output = new XrOutput(renderer, engine.view.camera.clone(), this.local);
-    this.sharing = new Sharing((camera) => options.report({ camera }));
+    this.sharing = new CameraReporter((camera) => options.report({ camera }));
     this.middles = [...layout.places.values()].map(({ corners }) => mean(corners));
     this.workplace = new XrWorkplace(this.middles);
     this.before = {
@@ -132,7 +132,7 @@ export class XrArSession implements ArMode {
     if (pictures) {
       this.pictures = new XrPictures(session, gl, options.layout, {
         found: (found, ms, taken) => this.take(found, ms, taken),
-        kept: (picture, taken) => this.keep(picture, taken),
+        captured: (picture, taken) => this.showFrozen(picture, taken),
         failed: options.ended,
       });
     }
@@ -172,7 +172,7 @@ export class XrArSession implements ArMode {
   }
 
   freeze(on: boolean): void {
-    if (on) this.pictures?.keepNext();
+    if (on) this.pictures?.captureNext();
     else this.thaw();
   }
 
@@ -223,7 +223,7 @@ export class XrArSession implements ArMode {
   }
 
   /** Take the pose of the workplace by touched points. */
-  registerTouched({ workplace, error, grade }: Extract<Touched, { grade: unknown }>): void {
+  registerTouched({ workplace, error, grade }: Extract<TouchFit, { grade: unknown }>): void {
     this.correct(this.workplace.register(workplace, "touch", error, this.viewer));
     this.nudge = UNMOVED;
     const found = { grade, touched: 3, used: [], contradicting: [], undecided: false, nudge: null };
@@ -257,7 +257,7 @@ export class XrArSession implements ArMode {
     this.options.report({ frozen: false });
   }
 
-  private keep(picture: HTMLCanvasElement, { eyes, camera }: Taken): void {
+  private showFrozen(picture: HTMLCanvasElement, { eyes, camera }: PictureOrigin): void {
     if (!this.workplace.pose) return;
     this.frozen = new FrozenPicture(this.options.engine.scene, picture);
     this.show(camera, eyes);
@@ -295,12 +295,12 @@ export class XrArSession implements ArMode {
       viewport: this.layer?.getViewport(view) as XRViewport,
     }));
     const [first] = pose.views;
-    if (first && tracked) this.pictures?.look(first, eyes);
+    if (first && tracked) this.pictures?.process(first, eyes);
     if (!this.frozen) this.show(viewer, eyes);
   }
 
   /** Show the workplace from a pose of the device; the 3D view, a part of the screen, shows its part. */
-  private show(viewer: typeof this.viewer, eyes: Taken["eyes"]): void {
+  private show(viewer: typeof this.viewer, eyes: PictureOrigin["eyes"]): void {
     this.viewer = viewer;
     this.eyes = eyes;
     const { pose } = this.workplace;
@@ -326,7 +326,7 @@ export class XrArSession implements ArMode {
     this.output.draw(scene, pose, this.layer, this.eyes, this.phase === "lost" ? LOST : 0);
   }
 
-  private take(found: Found, ms: number, taken: Taken): void {
+  private take(found: Found, ms: number, taken: PictureOrigin): void {
     if (this.ended || this.frozen) return;
     const { registration } = found;
     if (registration) {

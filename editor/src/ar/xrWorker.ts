@@ -7,5 +7,5 @@ import { Tracker } from "./tracker";
 serve(
   (setup) => new Tracker(setup),
   (tracker, { pixels, lens }: WithLens) =>
-    tracker.look(flipped(greyOf(pixels.data, pixels.width, pixels.height)), lens),
+    tracker.process(flipped(greyOf(pixels.data, pixels.width, pixels.height)), lens),
 );

@@ -7,11 +7,11 @@ interface Options {
   stopOutOfReach: () => void;
 }
 const sessions: Options[] = [];
-const endHolds = vi.fn();
+const stopHoldToRun = vi.fn();
 const stopMotion = vi.fn(async () => {});
 /** The session of WebXR that the browser starts. */
 const requestXr = vi.fn(async (): Promise<object> => ({}));
-vi.mock("./holdToRun", () => ({ endHolds }));
+vi.mock("./holdToRun", () => ({ stopHoldToRun }));
 vi.mock("../session/engine", () => ({ theEngine: () => ({}) }));
 vi.mock("./operation", () => ({ stopMotion }));
 vi.mock("../ar/motionSensor", () => ({ askForMotion: async () => {} }));
@@ -42,7 +42,7 @@ const { leaveAr, programEnded, startAr, startHere } = await import("./ar");
 
 async function started(method: "camera" | "xr" = "camera"): Promise<Options> {
   await startAr({ places: new Map() } as never, method, () => {});
-  endHolds.mockClear();
+  stopHoldToRun.mockClear();
   return sessions.at(-1) as Options;
 }
 
@@ -57,26 +57,26 @@ afterEach(() => {
 test("a held motion ends when AR is left or the camera ends", async () => {
   await started();
   leaveAr();
-  expect(endHolds).toHaveBeenCalledTimes(1);
+  expect(stopHoldToRun).toHaveBeenCalledTimes(1);
   leaveAr();
-  expect(endHolds).toHaveBeenCalledTimes(1);
+  expect(stopHoldToRun).toHaveBeenCalledTimes(1);
   (await started()).ended();
-  expect(endHolds).toHaveBeenCalledTimes(1);
+  expect(stopHoldToRun).toHaveBeenCalledTimes(1);
 });
 
 test("a held motion ends once when the markers are lost, not while the motion sensor replaces them", async () => {
   const { report } = await started();
   for (const phase of ["registered", "bridging", "registered"] as const) report({ phase });
-  expect(endHolds).not.toHaveBeenCalled();
+  expect(stopHoldToRun).not.toHaveBeenCalled();
   report({ phase: "lost" });
   report({ phase: "lost" });
-  expect(endHolds).toHaveBeenCalledTimes(1);
+  expect(stopHoldToRun).toHaveBeenCalledTimes(1);
 });
 
 test("a program that a headset started stops when no button stops motion any more", async () => {
   const { stopOutOfReach } = await started("xr");
   stopOutOfReach();
-  expect(endHolds).toHaveBeenCalledTimes(1);
+  expect(stopHoldToRun).toHaveBeenCalledTimes(1);
   expect(stopMotion).not.toHaveBeenCalled(); // it started none
   await startHere(async () => true);
   expect(stopMotion).not.toHaveBeenCalled();

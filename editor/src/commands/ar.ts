@@ -10,12 +10,12 @@ import type { XrArSession } from "../ar/xrSession";
 import type { Engine } from "../engine/engine";
 import { theEngine } from "../session/engine";
 import { rest } from "../session/rest";
-import { now, setUi } from "../store/store";
+import { getState, setUi } from "../store/store";
 import type { Ar } from "../store/ui";
 import { notMovable, targetOf } from "../transform/target";
 import { plus } from "../viewmodel/frames";
-import { endHolds } from "./holdToRun";
-import { moving } from "./move";
+import { stopHoldToRun } from "./holdToRun";
+import { beginMove } from "./move";
 import { stopMotion } from "./operation";
 
 declare module "../store/runtime" {
@@ -48,13 +48,13 @@ export async function startAr(layout: Layout, method: ArMethod, onEnd: (obstacle
   leaveAr();
   const engine = theEngine();
   const ended = () => {
-    if (now().ui.ar?.mode === "headset") stopOutOfReach();
+    if (getState().ui.ar?.mode === "headset") stopOutOfReach();
     leaveAr();
     onEnd("ended");
   };
   const mode = method === "xr" ? await xrMode(layout, engine, ended) : await cameraMode(layout, engine, ended);
   if (!mode) return;
-  use(mode);
+  setArMode(mode);
   setUi({ ar: initialAr(mode.mode, layout.places.size) });
   await mode.start().catch(() => {
     leaveAr();
@@ -90,7 +90,7 @@ async function xrMode(layout: Layout, engine: Engine | null, ended: () => void):
     layout,
     report,
     ended,
-    release: endHolds,
+    release: stopHoldToRun,
     stopMotion: () => void stopMotion(),
     stopOutOfReach,
     grab,
@@ -99,8 +99,8 @@ async function xrMode(layout: Layout, engine: Engine | null, ended: () => void):
 
 /** Handle that no stop button of a headset is available: stop hold-to-run and the program started from this headset. */
 function stopOutOfReach(): void {
-  const { runtime } = now();
-  endHolds();
+  const { runtime } = getState();
+  stopHoldToRun();
   if (!runtime.startedHere) return;
   runtime.startedHere.lost = true;
   runtime.startedHere = undefined;
@@ -109,7 +109,7 @@ function stopOutOfReach(): void {
 
 /** Start or continue the program from a headset; it runs only while a controller with a stop button is connected. */
 export async function startHere(start: () => Promise<unknown>): Promise<void> {
-  const { runtime } = now();
+  const { runtime } = getState();
   const program = { lost: false };
   runtime.startedHere = program;
   const started = await start();
@@ -119,20 +119,20 @@ export async function startHere(start: () => Promise<unknown>): Promise<void> {
 
 /** The program has ended; the next one may be started elsewhere. */
 export function programEnded(): void {
-  now().runtime.startedHere = undefined;
+  getState().runtime.startedHere = undefined;
 }
 
 /** Move the selected item with a ray. `from`: the grabbed point, m. */
 function grab(id: string, from: Vector3): Grab | null {
-  const state = now();
+  const state = getState();
   const target = state.ui.selection?.id === id ? targetOf(state, state.ui.selection) : null;
   if (!target?.moves || notMovable(state, target)) return null;
-  const one = moving(target);
+  const one = beginMove(target);
   const { position, orientation } = target.pose;
   return {
     to: (at) => {
       const shift = { x: at.x - from.x, y: at.y - from.y, z: at.z - from.z };
-      one.to({ position: plus(position, shift), orientation });
+      one.moveTo({ position: plus(position, shift), orientation });
     },
     end: () => one.finish(),
   };
@@ -140,49 +140,49 @@ function grab(id: string, from: Vector3): Grab | null {
 
 /** Leave AR, stop the camera and hold-to-run. `stay`: continue in the 3D view from the same viewpoint. */
 export function leaveAr(stay = false): void {
-  const { ar } = now().runtime;
-  if (ar) endHolds();
+  const { ar } = getState().runtime;
+  if (ar) stopHoldToRun();
   ar?.stop(stay);
-  now().runtime.startedHere = undefined; // Stop is on the page again
-  use(undefined);
-  if (now().ui.ar) setUi({ ar: null });
+  getState().runtime.startedHere = undefined; // Stop is on the page again
+  setArMode(undefined);
+  if (getState().ui.ar) setUi({ ar: null });
 }
 
-function use(session: ArMode | undefined): void {
-  now().runtime.ar = session;
+function setArMode(session: ArMode | undefined): void {
+  getState().runtime.ar = session;
   window.__ar = session;
 }
 
-export const freezeAr = (on: boolean): void => now().runtime.ar?.freeze(on);
+export const freezeAr = (on: boolean): void => getState().runtime.ar?.freeze(on);
 
 export function recalibrateAr(): void {
-  now().runtime.ar?.recalibrate();
+  getState().runtime.ar?.recalibrate();
 }
 
 /** Return the running AR view of a headset or tablet that tracks itself. */
 export function xrView(): XrArSession | null {
-  const { ar } = now().runtime;
+  const { ar } = getState().runtime;
   return ar && "registerTouched" in ar ? (ar as XrArSession) : null;
 }
 
 /** Open or close the controls for placing; without a registration, the workplace is placed by hand from now on. */
 export function openPlacing(placing: boolean): void {
-  if (placing) now().runtime.ar?.placeByHand();
+  if (placing) getState().runtime.ar?.placeByHand();
   report({ placing });
 }
 
 /** Forget what was placed by hand. */
 export function resetPlacing(): void {
-  now().runtime.ar?.resetPlacement();
-  report({ placing: now().ui.ar?.phase === "registered" });
+  getState().runtime.ar?.resetPlacement();
+  report({ placing: getState().ui.ar?.phase === "registered" });
 }
 
 export const showMarkers = (markers: boolean): void => report({ markers });
 
 function report(change: Partial<Ar>): void {
-  const { ar } = now().ui;
+  const { ar } = getState().ui;
   if (!ar) return;
-  if (change.phase === "lost" && ar.phase !== "lost") endHolds();
+  if (change.phase === "lost" && ar.phase !== "lost") stopHoldToRun();
   setUi({ ar: { ...ar, ...change } });
 }
 

@@ -6,7 +6,7 @@ import { saveAs } from "./files";
 
 export type AuditOutcome = "done" | "refused" | "forbidden";
 
-export interface AuditChange {
+interface AuditChange {
   kind: string;
   id: string;
   before: unknown;
@@ -26,7 +26,7 @@ export interface AuditEntry {
   changes: AuditChange[];
 }
 
-export interface AuditCheck {
+interface AuditCheck {
   problem: string;
   first: number;
   last: number;

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { State } from "../store/state";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 
 /** Time within which the event of a change arrives after the answer, s. */
 const WITHIN = 5;
@@ -10,7 +10,7 @@ const WITHIN = 5;
 /** Wait until `find` finds something in the state, and return it. Reject if it does not within the time limit, s. */
 export function awaited<T>(find: (state: State) => T | undefined, within = WITHIN): Promise<T> {
   return new Promise((resolve, reject) => {
-    const known = find(now());
+    const known = find(getState());
     if (known !== undefined) return resolve(known);
     const timer = setTimeout(() => {
       stop();

@@ -5,19 +5,19 @@ import { type ServerMessage, translate } from "../i18n/serverMessages";
 import type { MarkerCorners, Pivot, Pose, Position } from "../protocol/types";
 import { call } from "../session/connection";
 import { rest } from "../session/rest";
-import { now, setUi, store } from "../store/store";
+import { getState, setUi, store } from "../store/store";
 import { FLIPPED, pivotOffset } from "../transform/pivots";
 import { composed, ORIGIN } from "../viewmodel/frames";
-import { held, refusal } from "./requests";
-import { type Chosen, effectorPose, robotArg } from "./robot";
+import { refusal, withLock } from "./requests";
+import { effectorPose, type RobotSelection, robotArg } from "./robot";
 
 /** Set the pose of an object from the robot tool; `pivot` is the touched part of the object. */
-export const placeByRobot = (id: string, chosen: Chosen, pivot: Pivot) =>
+export const placeByRobot = (id: string, chosen: RobotSelection, pivot: Pivot) =>
   refusal(() => call("UpdateObjectPoseUsingRobot", { id, robot: robotArg(chosen), pivot }));
 
 /** Preview `placeByRobot` with the tool at a pose in the world. Return why it is impossible, or an empty string. */
 export function showAtTool(id: string, tool: Pose, pivot: Pivot): string {
-  const state = now();
+  const state = getState();
   const of = state.doc?.objects[id];
   const offset = pivotOffset(state.types.byName[of?.type ?? ""]?.object_model, pivot);
   if (!of || typeof offset === "string") return typeof offset === "string" ? offset : t`It no longer exists.`;
@@ -28,7 +28,7 @@ export function showAtTool(id: string, tool: Pose, pivot: Pivot): string {
 
 /** End the preview. */
 export function hideAtTool(id: string): void {
-  if (now().ui.draft?.id === id) setUi({ draft: undefined });
+  if (getState().ui.draft?.id === id) setUi({ draft: undefined });
 }
 
 // ------------------------------------------------------------------------------------------------ focus points
@@ -40,17 +40,17 @@ declare module "../store/runtime" {
 }
 
 /** Start to measure an object, which locks it and the robot until the end. Reject with the reason if refused. */
-export function startMeasurement(objectId: string, chosen: Chosen): Promise<void> {
+export function startMeasurement(objectId: string, chosen: RobotSelection): Promise<void> {
   return new Promise((resolve, reject) => {
-    held(objectId, () =>
-      held(chosen.robotId, async () => {
+    withLock(objectId, () =>
+      withLock(chosen.robotId, async () => {
         await call("ObjectAimingStart", { object_id: objectId, robot: robotArg(chosen) });
         await new Promise<void>((over) => {
           // The server cancels it on disconnect and when the scene goes offline.
           const stop = store.subscribe((state) => {
             if (state.connection.status !== "ready" || state.live.state !== "started") endMeasurement();
           });
-          now().runtime.endMeasurement = () => {
+          getState().runtime.endMeasurement = () => {
             stop();
             over();
           };
@@ -68,13 +68,13 @@ const NEEDED = 3;
 /** Record the tool position as a focus point, and update the fit. `known`: coordinates of the focus points. */
 export async function recordFocusPoint(
   index: number,
-  chosen: Chosen | null,
+  chosen: RobotSelection | null,
   known: readonly Position[],
 ): Promise<void> {
   // The server reads the tool position itself; this one is for the preview of the fit.
   const tool = chosen && effectorPose(chosen);
   const recorded = (await call("ObjectAimingAddPoint", { point_idx: index })).finished_indexes;
-  const { measurement } = now().ui;
+  const { measurement } = getState().ui;
   if (!measurement) return;
   const touched = tool ? { ...measurement.touched, [index]: tool.position } : measurement.touched;
   const fit = tool ? null : measurement.fit;
@@ -85,7 +85,7 @@ export async function recordFocusPoint(
     numbers.map((n) => known[n] ?? ORIGIN.position),
     numbers.map((n) => touched[n] ?? ORIGIN.position),
   );
-  const latest = now().ui.measurement;
+  const latest = getState().ui.measurement;
   if (latest?.touched !== touched) return; // another point was recorded meanwhile
   const found = { checked, rms: residual, worst: residuals[worst] ?? 0, worstPoint: numbers[worst] ?? 0 };
   setUi({ measurement: { ...latest, fit: found } });
@@ -104,7 +104,7 @@ export async function cancelMeasurement(): Promise<void> {
 }
 
 function endMeasurement(): void {
-  const { runtime } = now();
+  const { runtime } = getState();
   runtime.endMeasurement?.();
   runtime.endMeasurement = undefined;
   setUi({ measurement: null });
@@ -112,11 +112,11 @@ function endMeasurement(): void {
 
 // ------------------------------------------------------------------------------------------------ cameras
 export const calibrateCamera = (id: string) =>
-  refusal(() => held(id, () => storingOldPose(id, () => call("CalibrateCamera", { id }, { deadline: 30 }))));
+  refusal(() => withLock(id, () => storingOldPose(id, () => call("CalibrateCamera", { id }, { deadline: 30 }))));
 
 export const calibrateRobot = (robot_id: string, camera_id: string, move_to_calibration_pose: boolean) =>
   refusal(() =>
-    held(robot_id, () =>
+    withLock(robot_id, () =>
       storingOldPose(robot_id, () =>
         call("CalibrateRobot", { robot_id, camera_id, move_to_calibration_pose }, { deadline: 30 }),
       ),
@@ -127,7 +127,7 @@ export const calibrateRobot = (robot_id: string, camera_id: string, move_to_cali
 export const forgetOldPose = (): void => setUi({ beforeCalibration: null });
 
 async function storingOldPose(id: string, begin: () => Promise<unknown>): Promise<void> {
-  const pose = now().doc?.objects[id]?.pose ?? null;
+  const pose = getState().doc?.objects[id]?.pose ?? null;
   await begin();
   setUi({ beforeCalibration: pose && { id, pose } });
 }
@@ -144,7 +144,7 @@ export async function markersIn(id: string, picture: Blob): Promise<MarkerCorner
   const image = new TextDecoder("x-user-defined")
     .decode(bytes)
     .replace(/[\uf780-\uf7ff]/g, (each) => String.fromCharCode(each.charCodeAt(0) - 0xf700));
-  const camera_parameters = await held(id, () => call("CameraColorParameters", { id }));
+  const camera_parameters = await withLock(id, () => call("CameraColorParameters", { id }));
   return call("MarkersCorners", { camera_parameters, image });
 }
 
@@ -176,14 +176,14 @@ export const recordsOf = (object: string) =>
 /** Compare the focal length of a camera with the markers in a picture. Return the verdict; reject with the reason. */
 export async function checkLens(id: string): Promise<string> {
   const picture = await takePicture(id);
-  const camera_parameters = await held(id, () => call("CameraColorParameters", { id }));
+  const camera_parameters = await withLock(id, () => call("CameraColorParameters", { id }));
   const body = new FormData();
   body.append("image", picture, "picture.jpg");
   body.append("args", JSON.stringify({ camera_parameters }));
   return verdictOf(await json<Judged>("/api/calibration/lens", { method: "PUT", body }));
 }
 
-export interface TouchedFrame extends Judged {
+interface TouchedFrame extends Judged {
   pose: Pose;
   grade: string;
   /**
@@ -196,7 +196,7 @@ export interface TouchedFrame extends Judged {
 }
 
 /** Return the frame of points with known coordinates that were touched in the same order. Nothing is stored. */
-export const frameByPoints = (known: Position[], touched: Position[]) =>
+const frameByPoints = (known: Position[], touched: Position[]) =>
   json<TouchedFrame>("/api/calibration/touch/frame-by-points", {
     method: "PUT",
     json: { known, touched },
@@ -215,4 +215,4 @@ export const frameByAxes = (
   });
 
 export const placeAt = (object_id: string, pose: Pose) =>
-  refusal(() => held(object_id, () => call("UpdateSceneObjectPose", { object_id, pose })));
+  refusal(() => withLock(object_id, () => call("UpdateSceneObjectPose", { object_id, pose })));

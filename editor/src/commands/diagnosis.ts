@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { version } from "../../package.json";
 import { FILE_DEADLINE, rest } from "../session/rest";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 import { saveAs } from "./files";
 import { refusal } from "./requests";
 
@@ -18,7 +18,7 @@ export function saveDiagnosis(): Promise<string> {
 }
 
 function recorded() {
-  const { connection, ui, notices, tasks, live, runtime } = now();
+  const { connection, ui, notices, tasks, live, runtime } = getState();
   return {
     editor: version,
     browser: navigator.userAgent,

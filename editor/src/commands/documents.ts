@@ -4,9 +4,9 @@ import { call } from "../session/connection";
 import { theEngine } from "../session/engine";
 import { openId } from "../store/selectors";
 import type { State } from "../store/state";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 import { awaited } from "./awaited";
-import { ask, held, refusal } from "./requests";
+import { ask, refusal, withLock } from "./requests";
 
 export const openScene = (id: string) => ask("OpenScene", { id });
 export const openProject = (id: string) => ask("OpenProject", { id });
@@ -43,20 +43,20 @@ function listed(kind: "scene" | "project", name: string): Promise<string> {
 }
 
 export async function save() {
-  const document = openId(now());
+  const document = openId(getState());
   // Taken now, since the document may be closed as soon as it is saved. In AR, the view shows the picture of the
   // camera, which stays on this device.
-  const picture = now().ui.ar ? undefined : theEngine()?.picture();
-  const saved = await (now().doc?.project ? ask("SaveProject") : ask("SaveScene"));
+  const picture = getState().ui.ar ? undefined : theEngine()?.picture();
+  const saved = await (getState().doc?.project ? ask("SaveProject") : ask("SaveScene"));
   // A missing picture is harmless.
   if (saved && picture)
-    void import("./thumbnail").then(({ keepThumbnail }) => keepThumbnail(document, picture)).catch(() => {});
+    void import("./thumbnail").then(({ storeThumbnail }) => storeThumbnail(document, picture)).catch(() => {});
   return saved;
 }
 
 /** Close the open document; `force` discards unsaved changes. */
 export function close(force: boolean) {
-  return now().doc?.project ? ask("CloseProject", { force }) : ask("CloseScene", { force });
+  return getState().doc?.project ? ask("CloseProject", { force }) : ask("CloseScene", { force });
 }
 
 export const duplicateScene = (source_id: string, target_name: string) => ask("CopyScene", { source_id, target_name });
@@ -74,7 +74,7 @@ export const rename = (kind: "scene" | "project" | "package", id: string, new_na
   refusal(() =>
     kind === "package"
       ? call("RenamePackage", { package_id: id, new_name })
-      : held(id, () =>
+      : withLock(id, () =>
           kind === "scene"
             ? call("RenameScene", { id, new_name })
             : call("RenameProject", { project_id: id, new_name }),
@@ -88,7 +88,7 @@ export const deletePackage = (id: string) => ask("DeletePackage", { id });
 /** Return the projects of a scene. */
 export async function projectsOf(sceneId: string): Promise<{ id: string; name: string }[]> {
   const ids = await call("ProjectsWithScene", { id: sceneId });
-  const projects = now().lists.projects ?? [];
+  const projects = getState().lists.projects ?? [];
   return ids.map((id) => ({ id, name: projects.find((each) => each.id === id)?.name ?? id }));
 }
 

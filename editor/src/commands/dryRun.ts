@@ -7,7 +7,7 @@ import { call, serves } from "../session/connection";
 import { rest } from "../session/rest";
 import { whyUnavailable } from "../store/permissions";
 import type { State } from "../store/state";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 import { ask, sentence } from "./requests";
 
 /** The cycle time, bottleneck and waits of a run or dry run. */
@@ -29,7 +29,7 @@ export const startDryRun = (choice: StartDryRunArgs = {}) => ask("StartDryRun", 
 export const cancelDryRun = () => ask("CancelDryRun");
 
 /** Return a dry run with translated texts, by default the newest one of the open project; null if there is none. */
-export async function loadDryRun(number?: number): Promise<GetDryRunData | null> {
+async function loadDryRun(number?: number): Promise<GetDryRunData | null> {
   if (!serves("GetDryRun")) return null;
   try {
     const found = await call("GetDryRun", number === undefined ? {} : { number });
@@ -68,7 +68,7 @@ export async function loadTiming(key: string): Promise<Timing> {
 export async function showDryRun(project: string | undefined, number: number): Promise<void> {
   if (project === undefined) return;
   const found = await loadDryRun(number || undefined);
-  if (now().doc?.project?.id !== project) return;
+  if (getState().doc?.project?.id !== project) return;
   store.setState(({ program }) => ({ program: { ...program, dryRun: found } }));
 }
 

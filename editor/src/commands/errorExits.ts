@@ -5,13 +5,13 @@ import { freeKinds } from "../program/errorExits";
 import { cannotLead } from "../program/logic";
 import { freeErrorName } from "../program/naming";
 import { call } from "../session/connection";
-import { notify, now, select } from "../store/store";
+import { getState, notify, select } from "../store/store";
 import { awaited } from "./awaited";
-import { ask, held, newStep, refusal, sentence } from "./requests";
+import { ask, newStep, refusal, sentence, withLock } from "./requests";
 
 /** Add an error exit from an action and store the error, as one step of undo. Notify the user if it is impossible. */
 export async function addErrorExit(from: string, to: string): Promise<void> {
-  const { doc } = now();
+  const { doc } = getState();
   const action = doc?.actions[from];
   if (!doc || !action) return;
   const why = cannotLead(doc, from, to, "", true);
@@ -22,7 +22,7 @@ export async function addErrorExit(from: string, to: string): Promise<void> {
   if (!(await ask("AddLogicItem", { start: from, end: to, error_kinds: [kind] }, step))) return;
   if (!action.error_output) {
     const named = { action_id: from, error_output: freeErrorName(doc, action) };
-    await held(from, () => call("UpdateAction", named, step)).catch((error) => notify("error", sentence(error)));
+    await withLock(from, () => call("UpdateAction", named, step)).catch((error) => notify("error", sentence(error)));
   }
   const added = await awaited((state) =>
     Object.values(state.doc?.logic ?? {}).find((each) => each.start === from && each.error_kinds?.includes(kind)),
@@ -33,11 +33,11 @@ export async function addErrorExit(from: string, to: string): Promise<void> {
 /** Change the kinds of errors of an exit. Return why it was refused, for the form. */
 export const setErrorKinds = (id: string, error_kinds: string[]): Promise<string> =>
   refusal(() => {
-    const item = now().doc?.logic[id];
+    const item = getState().doc?.logic[id];
     if (!item) throw new Error(t`The connection no longer exists.`);
     return call("UpdateLogicItem", { logic_item_id: id, start: item.start, end: item.end, error_kinds });
   });
 
 /** Name the error of an action; an empty name: do not store it. Return why it was refused. */
 export const nameError = (action_id: string, error_output: string): Promise<string> =>
-  refusal(() => held(action_id, () => call("UpdateAction", { action_id, error_output })));
+  refusal(() => withLock(action_id, () => call("UpdateAction", { action_id, error_output })));

@@ -3,11 +3,11 @@
 import { t } from "@lingui/core/macro";
 import { functionNames, picked, suggestedName } from "../program/functions";
 import { freeName } from "../program/naming";
-import { initial } from "../program/values";
+import { initialValue } from "../program/values";
 import type { FunctionExport, Parameter } from "../protocol/types";
 import { call } from "../session/connection";
 import { scopeOf } from "../store/scope";
-import { notify, now, select, setUi, show } from "../store/store";
+import { getState, notify, select, setUi, showFunction } from "../store/store";
 import { awaited } from "./awaited";
 import { saveAs } from "./files";
 import { ask, refusal, sentence, whyNot } from "./requests";
@@ -15,20 +15,20 @@ import { ask, refusal, sentence, whyNot } from "./requests";
 // ------------------------------------------------------------------------------------------------ selection
 /** Select several actions from now on: each tap adds or removes one. */
 export const startPicking = (ids: readonly string[] = []): void => {
-  setUi({ picked: ids, connecting: null, tool: now().ui.tool });
+  setUi({ picked: ids, connecting: null, tool: getState().ui.tool });
 };
 
 export const cancelPicking = (): void => setUi({ picked: null });
 
 /** Add or remove an action, with those between. */
 export function pickAction(id: string): void {
-  const { doc, ui } = now();
+  const { doc, ui } = getState();
   if (doc && ui.picked && id in doc.actions) setUi({ picked: picked(doc, ui.picked, id) });
 }
 
 /** Return why the selected actions cannot become a function; an empty string if they can. */
 export const whyNoFunction = (ids: readonly string[]): Promise<string> => {
-  const { doc } = now();
+  const { doc } = getState();
   if (!doc || ids.length === 0) return Promise.resolve(t`Tap the actions.`);
   return whyNot("MakeFunction", { name: suggestedName(doc, ids), action_ids: [...ids] });
 };
@@ -53,9 +53,9 @@ export async function dissolve(action_id: string): Promise<void> {
 // ------------------------------------------------------------------------------------------------ navigation
 /** Show a function; Back returns to what is shown now. */
 export function openFunction(id: string): void {
-  const path = now().doc?.path ?? [];
+  const path = getState().doc?.path ?? [];
   const known = path.indexOf(id);
-  show(known < 0 ? [...path, id] : path.slice(0, known + 1));
+  showFunction(known < 0 ? [...path, id] : path.slice(0, known + 1));
 }
 
 // ------------------------------------------------------------------------------------------------ functions
@@ -71,7 +71,7 @@ export const renameFunction = (function_id: string, new_name: string) =>
   ask("RenameFunction", { function_id, new_name });
 
 export async function removeFunction(id: string): Promise<void> {
-  const name = now().doc?.functions[id]?.name ?? "";
+  const name = getState().doc?.functions[id]?.name ?? "";
   if (await ask("RemoveFunction", { id })) notify("info", t`Removed ${name}. Press Undo to restore.`);
 }
 
@@ -87,14 +87,14 @@ async function openAdded(ids: readonly string[]): Promise<void> {
   const id = ids.at(-1) ?? "";
   const added = await awaited((state) => state.doc?.functions[id]).catch(() => null);
   if (!added) return;
-  show([id]);
+  showFunction([id]);
   notify("info", t`Added the function ${added.name}.`);
 }
 
 /** Save a function, with those that it calls, as a file on this device. */
 export async function exportFunction(id: string): Promise<void> {
   const found = await ask("ExportFunction", { id });
-  const name = now().doc?.functions[id]?.name ?? "function";
+  const name = getState().doc?.functions[id]?.name ?? "function";
   if (found) saveAs(new Blob([JSON.stringify(found.data, null, 2)], { type: "application/json" }), `${name}.json`);
 }
 
@@ -114,7 +114,7 @@ export async function readFunction(file: Blob): Promise<FunctionFile> {
   }
   if (!Array.isArray(content?.functions) || !Array.isArray(content.references))
     throw new Error(t`The file does not contain a function.`);
-  const { doc } = now();
+  const { doc } = getState();
   const names = new Set(Object.values(doc?.points ?? {}).map((each) => each.name));
   const lacking = content.references.flatMap(({ point_id, point }) =>
     point !== undefined && !(point_id !== undefined && doc && point_id in doc.points) && !names.has(point)
@@ -138,7 +138,7 @@ export async function importFunction({ content }: FunctionFile, points: Record<s
 // ------------------------------------------------------------------------------------------------ parameters, results
 /** Return a value for the present calls when a parameter of a type is added. */
 function valueFor(name: string, type: string): Parameter | undefined {
-  const { doc } = now();
+  const { doc } = getState();
   const place =
     type === "pose"
       ? Object.keys(doc?.orientations ?? {})[0]
@@ -147,7 +147,7 @@ function valueFor(name: string, type: string): Parameter | undefined {
         : type === "position"
           ? Object.keys(doc?.points ?? {})[0]
           : undefined;
-  const value = place === undefined ? initial({ name, type, dynamic_value: false }) : JSON.stringify(place);
+  const value = place === undefined ? initialValue({ name, type, dynamic_value: false }) : JSON.stringify(place);
   return value === undefined ? undefined : { name, type, value };
 }
 
@@ -155,7 +155,7 @@ function valueFor(name: string, type: string): Parameter | undefined {
 export const addFunctionParameter = (name: string, type: string, value?: string): Promise<string> =>
   refusal(() =>
     call("AddFunctionParameter", {
-      function_id: scopeOf(now().doc ?? { path: [] }),
+      function_id: scopeOf(getState().doc ?? { path: [] }),
       name,
       type,
       value: value === undefined ? valueFor(name, type) : { name, type, value },
@@ -164,7 +164,7 @@ export const addFunctionParameter = (name: string, type: string, value?: string)
 
 /** Return a free name for a parameter of the open function. */
 export function freeParameterName(base: string): string {
-  const { doc } = now();
+  const { doc } = getState();
   const open = doc?.functions[scopeOf(doc)];
   const stored = Object.values(open?.actions ?? {}).flatMap((each) => each.flows.flatMap((flow) => flow.outputs));
   return freeName(base, [...(open?.parameters.map((each) => each.name) ?? []), ...stored]);
@@ -184,21 +184,21 @@ export const updateFunctionParameter = (
     const { type } = change;
     const value =
       type === undefined ? undefined : json === undefined ? valueFor(name, type) : { name, type, value: json };
-    const function_id = scopeOf(now().doc ?? { path: [] });
+    const function_id = scopeOf(getState().doc ?? { path: [] });
     return call("UpdateFunctionParameter", { function_id, name, ...change, ...(value && { value }) });
   });
 
 export const removeFunctionParameter = (name: string) =>
-  ask("RemoveFunctionParameter", { function_id: scopeOf(now().doc ?? { path: [] }), name });
+  ask("RemoveFunctionParameter", { function_id: scopeOf(getState().doc ?? { path: [] }), name });
 
 export const addFunctionResult = (link: string) =>
-  ask("AddFunctionResult", { function_id: scopeOf(now().doc ?? { path: [] }), link });
+  ask("AddFunctionResult", { function_id: scopeOf(getState().doc ?? { path: [] }), link });
 
 export const removeFunctionResult = (index: number) =>
-  ask("RemoveFunctionResult", { function_id: scopeOf(now().doc ?? { path: [] }), index });
+  ask("RemoveFunctionResult", { function_id: scopeOf(getState().doc ?? { path: [] }), index });
 
 /** Return a free name for a function. */
 export const freeFunctionName = (base: string): string => {
-  const { doc } = now();
+  const { doc } = getState();
   return freeName(base, doc ? functionNames(doc) : []);
 };

@@ -1,17 +1,17 @@
 /** Request an item that another user has locked, and notify users about requests and released items. */
 
 import { t } from "@lingui/core/macro";
-import { handOver, keyOf } from "../store/handover";
-import { notify, now, store } from "../store/store";
+import { handOver, requestKey } from "../store/handover";
+import { getState, notify, store } from "../store/store";
 import { nameOf } from "../viewmodel/names";
 import { storeViewState } from "./viewstate";
 
 export function requestItem(id: string): void {
-  storeViewState("shared", { [keyOf(id)]: { by: now().connection.user, at: Date.now() } });
+  storeViewState("shared", { [requestKey(id)]: { by: getState().connection.user, at: Date.now() } });
 }
 
 export function withdrawRequest(id: string): void {
-  storeViewState("shared", { [keyOf(id)]: null });
+  storeViewState("shared", { [requestKey(id)]: null });
 }
 
 /** Notify the user of requests from now on. Return a function that stops it. */

@@ -2,8 +2,8 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 
 const call = vi.fn((_request: string, _args: { hold: number; valid_ms: number }) => Promise.resolve({}));
 vi.mock("../session/connection", () => ({ call }));
-vi.mock("./requests", () => ({ held: (_id: string, work: () => unknown) => work(), sentence: String }));
-const { endHolds, holdJog } = await import("./holdToRun");
+vi.mock("./requests", () => ({ withLock: (_id: string, work: () => unknown) => work(), sentence: String }));
+const { stopHoldToRun, holdJog } = await import("./holdToRun");
 const { setConnection } = await import("../store/store");
 
 const JOG = { axis: "x" } as never;
@@ -16,7 +16,7 @@ beforeEach(() => {
   vi.clearAllMocks();
 });
 afterEach(() => {
-  endHolds();
+  stopHoldToRun();
   vi.unstubAllGlobals();
 });
 

@@ -5,14 +5,14 @@
 
 import type { JogRobotArgs } from "../protocol/types";
 import { call } from "../session/connection";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 import { Lease, type LeaseRequest } from "./lease";
-import { held, sentence } from "./requests";
+import { sentence, withLock } from "./requests";
 
-export type JogWhat = Omit<JogRobotArgs, "robot_id" | "hold" | "sent_ms" | "valid_ms">;
+type JogCommand = Omit<JogRobotArgs, "robot_id" | "hold" | "sent_ms" | "valid_ms">;
 
 /** A running hold-to-run motion. `over` resolves at its end, with the reason if the user did not release it. */
-export interface Held {
+export interface HoldToRunMotion {
   end: () => void;
   over: Promise<string>;
 }
@@ -25,25 +25,27 @@ declare module "../store/runtime" {
 }
 
 /** Stop the running hold-to-run motion. */
-export function endHolds(): void {
-  now().runtime.lease?.end();
+export function stopHoldToRun(): void {
+  getState().runtime.lease?.end();
 }
 
-export function holdJog(robot_id: string, what: JogWhat): Held {
-  return hold(robot_id, (lease) => call("JogRobot", { robot_id, ...what, ...lease }));
+export function holdJog(robot_id: string, command: JogCommand): HoldToRunMotion {
+  return startHoldToRun(robot_id, (lease) => call("JogRobot", { robot_id, ...command, ...lease }));
 }
 
-export function holdHandTeaching(robot_id: string, arm_id?: string): Held {
-  return hold(robot_id, (lease) => call("HoldHandTeaching", { robot_id, ...(arm_id ? { arm_id } : {}), ...lease }));
+export function holdHandTeaching(robot_id: string, arm_id?: string): HoldToRunMotion {
+  return startHoldToRun(robot_id, (lease) =>
+    call("HoldHandTeaching", { robot_id, ...(arm_id ? { arm_id } : {}), ...lease }),
+  );
 }
 
-function hold(robotId: string, send: (request: LeaseRequest) => Promise<unknown>): Held {
-  endHolds();
-  const { runtime } = now();
+function startHoldToRun(robotId: string, send: (request: LeaseRequest) => Promise<unknown>): HoldToRunMotion {
+  stopHoldToRun();
+  const { runtime } = getState();
   const lease = new Lease(++runtime.holds, send);
   runtime.lease = lease;
   const unwatch = endWhenLeft(lease);
-  const over = held(robotId, () => {
+  const over = withLock(robotId, () => {
     lease.begin();
     return lease.over;
   })

@@ -1,10 +1,10 @@
 import { expect, test } from "vitest";
-import { isHere } from "./invitation";
+import { isLocalHost } from "./invitation";
 
 test.each(["localhost", "cell.localhost", "127.0.0.1", "127.83.1.7", "[::1]", "0.0.0.0"])(
   "%s is not an address for other devices",
   (host) => {
-    expect(isHere(host)).toBe(true);
+    expect(isLocalHost(host)).toBe(true);
   },
 );
 
@@ -16,5 +16,5 @@ test.each([
   "cell-3",
   "[2001:db8::1]",
 ])("%s can be an address for other devices", (host) => {
-  expect(isHere(host)).toBe(false);
+  expect(isLocalHost(host)).toBe(false);
 });

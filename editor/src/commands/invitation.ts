@@ -2,7 +2,7 @@
 
 import { rest } from "../session/rest";
 
-export interface Joining {
+export interface InvitationData {
   /** Addresses, best first; empty if only this computer can reach the server. */
   addresses: string[];
   /** SHA-256 fingerprint of the certificate; empty without TLS. */
@@ -12,11 +12,11 @@ export interface Joining {
 }
 
 /** Request the data from the server. An older server does not have it: return the address of this page. */
-export async function loadInvitation(): Promise<Joining> {
-  const here = isHere(location.hostname) ? [] : [location.origin];
+export async function loadInvitation(): Promise<InvitationData> {
+  const here = isLocalHost(location.hostname) ? [] : [location.origin];
   try {
     const response = await rest("/api/joining");
-    const { addresses, fingerprint, authority } = (await response.json()) as Partial<Joining>;
+    const { addresses, fingerprint, authority } = (await response.json()) as Partial<InvitationData>;
     // The address of this page is known to work.
     return {
       addresses: [...new Set([...here, ...(addresses ?? [])])],
@@ -29,7 +29,7 @@ export async function loadInvitation(): Promise<Joining> {
 }
 
 /** Return whether a host name means the local computer, which other devices cannot reach. */
-export const isHere = (host: string) =>
+export const isLocalHost = (host: string) =>
   host === "localhost" ||
   host.endsWith(".localhost") ||
   host === "[::1]" ||

@@ -1,7 +1,7 @@
 /** Device cards: identities, and backups of parameters. */
 
 import { t } from "@lingui/core/macro";
-import { compared } from "../formats";
+import { compareTexts } from "../formats";
 import type { DeviceCard, Identity, ParameterBackup } from "../protocol/types";
 import { call } from "../session/connection";
 import { saveAs } from "./files";
@@ -27,7 +27,9 @@ export function differenceOf({ identity, found, differing }: DeviceCard): string
 
 /** Sort cards: devices that need a technician first, then by name. */
 export const sortedCards = (cards: readonly DeviceCard[]): DeviceCard[] =>
-  [...cards].sort((a, b) => Number(b.found !== undefined) - Number(a.found !== undefined) || compared(a.name, b.name));
+  [...cards].sort(
+    (a, b) => Number(b.found !== undefined) - Number(a.found !== undefined) || compareTexts(a.name, b.name),
+  );
 
 /** Save a backup as a file on this device. */
 export async function downloadBackup({ object_id, name }: DeviceCard, backup_id: string): Promise<void> {

@@ -6,11 +6,11 @@
 import type { ObjectModel, Pose } from "../protocol/types";
 import { call, serves } from "../session/connection";
 import { itemOf } from "../store/document";
-import { now, setUi, store } from "../store/store";
+import { getState, setUi, store } from "../store/store";
 import { same } from "../transform/placing";
 import type { Target } from "../transform/target";
 import { relativeTo } from "../viewmodel/frames";
-import { ask, holding } from "./requests";
+import { ask, withLockOrNotify } from "./requests";
 
 /** Time between two previews, s. */
 const PREVIEW = 1 / 30;
@@ -20,12 +20,12 @@ export const SETTLED = 0.6;
 declare module "../store/runtime" {
   interface Runtime {
     /** The change in progress, until the server has accepted or refused it. */
-    moving?: Moving | undefined;
+    itemMove?: ItemMove | undefined;
   }
 }
 
 /** A change in progress. */
-export class Moving {
+export class ItemMove {
   /** It was refused or cancelled. */
   failed = false;
   /** Resolves when the server has accepted or refused the edit. */
@@ -57,14 +57,14 @@ export class Moving {
       if (ui.selection?.id !== selection?.id && ui.selection?.id !== target.id) this.finish();
     });
     this.over = before
-      .then(() => holding(target.id, work, carriesPoints(target)))
+      .then(() => withLockOrNotify(target.id, work, carriesPoints(target)))
       .then((done) => {
         this.ended = true;
         clearTimeout(this.previewTimer);
         clearTimeout(this.settleTimer);
         unsubscribe();
-        const { runtime } = now();
-        if (runtime.moving === this) runtime.moving = undefined;
+        const { runtime } = getState();
+        if (runtime.itemMove === this) runtime.itemMove = undefined;
         if (done) return;
         this.failed = true;
         this.forget();
@@ -72,12 +72,12 @@ export class Moving {
   }
 
   /** Show the item at a pose in the world. */
-  to(pose: Pose, model?: ObjectModel): void {
+  moveTo(pose: Pose, model?: ObjectModel): void {
     if (this.failed || this.ended) return;
     const { target } = this;
     this.stored = relativeTo(target.frame, pose);
     if (model) this.model = model;
-    const state = now();
+    const state = getState();
     const type = this.model && target.type ? { model: this.model, type: state.types.byName[target.type] } : {};
     setUi({ draft: { id: target.id, of: itemOf(state.doc, target.id), pose: this.stored, continues: true, ...type } });
     this.preview();
@@ -88,7 +88,7 @@ export class Moving {
     if (this.finishing) return;
     this.finishing = true;
     clearTimeout(this.settleTimer);
-    const { draft } = now().ui;
+    const { draft } = getState().ui;
     if (draft?.id === this.target.id) setUi({ draft: { ...draft, continues: false } });
     this.end(true);
   }
@@ -107,7 +107,7 @@ export class Moving {
   }
 
   private forget(): void {
-    if (now().ui.draft?.id === this.target.id) setUi({ draft: undefined });
+    if (getState().ui.draft?.id === this.target.id) setUi({ draft: undefined });
   }
 
   /** Send the current pose to the other users; older ones are dropped. */
@@ -130,23 +130,23 @@ export class Moving {
     const { target, stored, model } = this;
     if (model && target.type) {
       const { type } = target;
-      if (!(await holding(type, () => ask("UpdateSceneShape", { object_type_id: type, object_model: model }))))
+      if (!(await withLockOrNotify(type, () => ask("UpdateSceneShape", { object_type_id: type, object_model: model }))))
         return false;
     }
     if (!stored || same(stored, relativeTo(target.frame, target.pose))) {
       this.forget();
       return true;
     }
-    return (await asked(target, stored)) !== undefined;
+    return (await sendPose(target, stored)) !== undefined;
   }
 }
 
 /** Return whether action points move with it: they have to be locked, too. */
 function carriesPoints({ kind, id }: Target): boolean {
-  return kind === "point" || Object.values(now().doc?.points ?? {}).some((each) => each.parent === id);
+  return kind === "point" || Object.values(getState().doc?.points ?? {}).some((each) => each.parent === id);
 }
 
-function asked({ kind, id }: Target, { position, orientation }: Pose) {
+function sendPose({ kind, id }: Target, { position, orientation }: Pose) {
   switch (kind) {
     case "object":
       return ask("UpdateSceneObjectPose", { object_id: id, pose: { position, orientation } });
@@ -158,19 +158,19 @@ function asked({ kind, id }: Target, { position, orientation }: Pose) {
 }
 
 /** Start to move an item, or continue. A previous change of another item is finished. */
-export function moving(target: Target): Moving {
-  const { runtime } = now();
-  const running = runtime.moving;
+export function beginMove(target: Target): ItemMove {
+  const { runtime } = getState();
+  const running = runtime.itemMove;
   if (running && !running.finishing && !running.failed && running.target.id === target.id) return running;
   running?.finish();
-  runtime.moving = new Moving(target, running?.over);
-  return runtime.moving;
+  runtime.itemMove = new ItemMove(target, running?.over);
+  return runtime.itemMove;
 }
 
 /** Move the item to a pose in the world by one edit. */
 export async function place(target: Target, pose: Pose, model?: ObjectModel): Promise<boolean> {
-  const one = moving(target);
-  one.to(pose, model);
+  const one = beginMove(target);
+  one.moveTo(pose, model);
   one.finish();
   await one.over;
   return !one.failed;
@@ -178,7 +178,7 @@ export async function place(target: Target, pose: Pose, model?: ObjectModel): Pr
 
 /** Make a step; several quick steps become one edit. */
 export function step(target: Target, pose: Pose): void {
-  const one = moving(target);
-  one.to(pose);
+  const one = beginMove(target);
+  one.moveTo(pose);
   one.settle();
 }

@@ -1,15 +1,15 @@
 /** Move an action within a straight sequence of the program. */
 
 import { moveOf } from "../program/moving";
-import { notify, now } from "../store/store";
+import { getState, notify } from "../store/store";
 import { notEditable, updateStep } from "./program";
 import { ask, newStep } from "./requests";
 
 /** Move an action to a place in its run, as one step of undo. Notify the user if it is impossible. */
 export async function moveAction(id: string, to: number): Promise<void> {
-  const { doc } = now();
+  const { doc } = getState();
   if (!doc) return;
-  const why = notEditable(now(), "UpdateLogicItem");
+  const why = notEditable(getState(), "UpdateLogicItem");
   const move = why || moveOf(doc, id, to);
   if (typeof move === "string") return notify("info", move);
   const step = newStep();

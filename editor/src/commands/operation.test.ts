@@ -3,10 +3,10 @@ import { setTranslations } from "../i18n/testing";
 
 const call = vi.fn();
 vi.mock("../session/connection", () => ({ call, serves: () => true }));
-const endHolds = vi.fn();
-vi.mock("./holdToRun", () => ({ endHolds }));
+const stopHoldToRun = vi.fn();
+vi.mock("./holdToRun", () => ({ stopHoldToRun }));
 const notify = vi.fn();
-vi.mock("../store/store", () => ({ notify, now: () => ({}) }));
+vi.mock("../store/store", () => ({ notify, getState: () => ({}) }));
 const { stopMotion } = await import("./operation");
 
 beforeEach(() => vi.clearAllMocks());
@@ -16,7 +16,7 @@ test("Stop sends one request, ends holds at once, and reports nothing if everyth
   call.mockReturnValue(new Promise((done) => (answer = done)));
   const stopped = stopMotion();
   expect(call.mock.calls.map(([request]) => request)).toEqual(["StopAll"]);
-  expect(endHolds).toHaveBeenCalledOnce();
+  expect(stopHoldToRun).toHaveBeenCalledOnce();
   answer({ outcomes: [{ kind: "device", id: "obj_1", name: "ur5e", stopped: true }] });
   await stopped;
   expect(notify).not.toHaveBeenCalled();

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { inUserLanguage } from "../i18n/serverMessages";
 import { call, serves } from "../session/connection";
 import { notify } from "../store/store";
-import { endHolds } from "./holdToRun";
+import { stopHoldToRun } from "./holdToRun";
 import { ask, sentence } from "./requests";
 
 /** Go online; devices that fail are left out if the server supports it. */
@@ -21,7 +21,7 @@ const STOPPED_TIMEOUT = 5;
  */
 export async function stopMotion(): Promise<void> {
   const answer = call("StopAll", undefined, { deadline: STOPPED_TIMEOUT });
-  endHolds();
+  stopHoldToRun();
   let reasons: string[];
   try {
     const missed = (await answer).outcomes.filter((each) => !each.stopped);

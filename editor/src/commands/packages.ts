@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { freeName } from "../program/naming";
 import { FILE_DEADLINE, rest } from "../session/rest";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 import { saveAs } from "./files";
 import { refusal } from "./requests";
 
@@ -11,7 +11,7 @@ import { refusal } from "./requests";
 export function uploadPackage(file: File): Promise<string> {
   return refusal(async () => {
     const base = file.name.replace(/\.zip$/i, "").replace(/[^\w-]+/g, "_") || "package";
-    const taken = now().lists.packages?.map((each) => each.id) ?? [];
+    const taken = getState().lists.packages?.map((each) => each.id) ?? [];
     const id = freeName(base, taken);
     const body = new FormData();
     body.append("executionPackage", file);

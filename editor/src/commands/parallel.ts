@@ -8,20 +8,20 @@ import { actionNames, freeName } from "../program/naming";
 import { callsIn } from "../program/parallel";
 import type { CallOptions } from "../protocol/client";
 import { call } from "../session/connection";
-import { notify, now, select, setUi } from "../store/store";
+import { getState, notify, select, setUi } from "../store/store";
 import { awaited } from "./awaited";
 import { addLoose, insert } from "./program";
 import { ask, newStep, sentence, whyNot } from "./requests";
 
 /** Return a free name for parallel work. */
 export const parallelName = (): string => {
-  const { doc } = now();
+  const { doc } = getState();
   return doc ? freeName("in_parallel", actionNames(doc)) : "";
 };
 
 /** Return why the selected actions cannot run at once; an empty string if they can. */
 export async function whyNotParallel(ids: readonly string[]): Promise<string> {
-  const { doc } = now();
+  const { doc } = getState();
   if (!doc || ids.length < MIN_BRANCHES || ids.length > MAX_BRANCHES) return t`Select two to four calls of functions.`;
   const calls = callsIn(doc, { branches: [...ids] });
   const other = calls.find((each) => !calledBy(doc, each));
@@ -57,7 +57,7 @@ export async function addParallel(name: string, functions: readonly string[], sl
 
 /** Add a call of a function without connections. Return its id. */
 function newCall(functionId: string, slot: Slot | null, step: CallOptions, pointId?: string): Promise<string> {
-  const { doc, types } = now();
+  const { doc, types } = getState();
   const called = doc?.functions[functionId];
   if (!doc || !called) throw new Error(t`The function no longer exists.`);
   return addLoose(functionId, callMeta(types, doc, called), pointId === undefined ? null : { pointId }, slot, step);
@@ -65,7 +65,7 @@ function newCall(functionId: string, slot: Slot | null, step: CallOptions, point
 
 /** Add a call of a function as another branch. */
 export async function addBranch(action_id: string, functionId: string): Promise<void> {
-  const action = now().doc?.actions[action_id];
+  const action = getState().doc?.actions[action_id];
   if (!action?.branches) return;
   const step = newStep();
   try {
@@ -78,7 +78,7 @@ export async function addBranch(action_id: string, functionId: string): Promise<
 
 /** Remove a branch with its call. The branch is kept if its results are used. */
 export async function removeBranch(action_id: string, id: string): Promise<void> {
-  const { doc } = now();
+  const { doc } = getState();
   const action = doc?.actions[action_id];
   const name = doc?.actions[id]?.name ?? "";
   if (!action?.branches) return;
@@ -91,6 +91,6 @@ export async function removeBranch(action_id: string, id: string): Promise<void>
 
 /** Let the calls run one after the other, and select the first one. */
 export async function dissolveParallel(action_id: string): Promise<void> {
-  const first = now().doc?.actions[action_id]?.branches?.[0];
+  const first = getState().doc?.actions[action_id]?.branches?.[0];
   if ((await ask("DissolveParallel", { action_id })) && first !== undefined) select({ kind: "action", id: first });
 }

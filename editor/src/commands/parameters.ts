@@ -2,14 +2,14 @@
 
 import type { Parameter } from "../protocol/types";
 import { call } from "../session/connection";
-import { now } from "../store/store";
-import { ask, held, refusal } from "./requests";
+import { getState } from "../store/store";
+import { ask, refusal, withLock } from "./requests";
 
 /** Add a project parameter. Actions can store results in a variable. */
 export const addParameter = (name: string, type: string, value: string, variable = false): Promise<string> =>
   refusal(() => call("AddProjectParameter", { name, type, value, ...(variable ? { variable } : {}) }));
 export const updateParameter = (id: string, change: { name?: string; value?: string }): Promise<string> =>
-  refusal(() => held(id, () => call("UpdateProjectParameter", { id, ...change })));
+  refusal(() => withLock(id, () => call("UpdateProjectParameter", { id, ...change })));
 export const removeParameter = (id: string) => ask("RemoveProjectParameter", { id });
 
 /** Override a device setting in the project; `value` undefined removes the override. */
@@ -19,8 +19,8 @@ export const override = (
   value: string | undefined,
 ): Promise<string> =>
   refusal(() =>
-    held(objectId, async () => {
-      const known = now().doc?.overrides[objectId]?.[setting.name];
+    withLock(objectId, async () => {
+      const known = getState().doc?.overrides[objectId]?.[setting.name];
       if (value === undefined) {
         if (known) await call("DeleteOverride", { id: objectId, override: known });
       } else await call(known ? "UpdateOverride" : "AddOverride", { id: objectId, override: { ...setting, value } });

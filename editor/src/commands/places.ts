@@ -2,11 +2,11 @@
 
 import type { Pose } from "../protocol/types";
 import { call, serves } from "../session/connection";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 
 /** Draw a device at a pose, for all users; null: show it in lists only. */
 export function placeDevice(id: string, pose: Pose | null): void {
-  const document = now().doc?.scene.id;
+  const document = getState().doc?.scene.id;
   if (document === undefined) return;
   const key = `place/${id}`;
   store.setState(({ view }) => {

@@ -5,11 +5,11 @@ import { freeName } from "../program/naming";
 import type { Joint, Orientation, Position } from "../protocol/types";
 import { call } from "../session/connection";
 import type { State } from "../store/state";
-import { now, select } from "../store/store";
+import { getState, select } from "../store/store";
 import { relativeTo, worldOf } from "../viewmodel/frames";
 import { awaited } from "./awaited";
-import { held, newStep, refusal } from "./requests";
-import { type Chosen, robotArg } from "./robot";
+import { newStep, refusal, withLock } from "./requests";
+import { type RobotSelection, robotArg } from "./robot";
 
 const names = (of: Record<string, { name: string }> | undefined) => Object.values(of ?? {}).map((each) => each.name);
 
@@ -26,7 +26,7 @@ const pointNamed = (name: string) =>
 /** Add a point at a position in the world, with an optional parent, and select it. */
 export function addPoint(world: Position, parent = "", orientation?: Orientation): Promise<string> {
   return refusal(async () => {
-    const { doc } = now();
+    const { doc } = getState();
     if (!doc) return;
     const name = freeName("point", names(doc.points));
     const frame = worldOf(doc, parent);
@@ -38,7 +38,7 @@ export function addPoint(world: Position, parent = "", orientation?: Orientation
     select({ kind: "point", id: point.id });
     if (orientation) {
       const turned = relativeTo(frame, { position: world, orientation }).orientation;
-      await held(point.id, () =>
+      await withLock(point.id, () =>
         call("AddActionPointOrientation", { action_point_id: point.id, orientation: turned, name: "default" }, step),
       );
     }
@@ -46,15 +46,15 @@ export function addPoint(world: Position, parent = "", orientation?: Orientation
 }
 
 /** Save the robot pose as a point with orientation and joints, and select it. */
-export const addPointFromRobot = (chosen: Chosen): Promise<string> =>
+export const addPointFromRobot = (chosen: RobotSelection): Promise<string> =>
   refusal(async () => {
     const point = await pointNamed(await teachPoint(chosen));
     if (point) select({ kind: "point", id: point.id });
   });
 
 /** Save the robot pose as a point with orientation and joints. Return its name. */
-export async function teachPoint({ robotId, armId, effector }: Chosen): Promise<string> {
-  const name = freeName("point", names(now().doc?.points));
+export async function teachPoint({ robotId, armId, effector }: RobotSelection): Promise<string> {
+  const name = freeName("point", names(getState().doc?.points));
   await call("AddApUsingRobot", {
     robot_id: robotId,
     end_effector_id: effector,
@@ -64,20 +64,14 @@ export async function teachPoint({ robotId, armId, effector }: Chosen): Promise<
   return name;
 }
 
-/** Move a point in the frame of its parent, together with its children. */
-export const movePoint = (id: string, position: Position) =>
+export const movePointToRobot = (id: string, chosen: RobotSelection) =>
   refusal(() =>
-    held(id, () => call("UpdateActionPointPosition", { action_point_id: id, new_position: position }), true),
-  );
-
-export const movePointToRobot = (id: string, chosen: Chosen) =>
-  refusal(() =>
-    held(id, () => call("UpdateActionPointUsingRobot", { action_point_id: id, robot: robotArg(chosen) }), true),
+    withLock(id, () => call("UpdateActionPointUsingRobot", { action_point_id: id, robot: robotArg(chosen) }), true),
   );
 
 /** Change the parent of a point; its position in the world stays the same. */
 export const setParent = (id: string, parent: string) =>
-  refusal(() => held(id, () => call("UpdateActionPointParent", { action_point_id: id, new_parent_id: parent })));
+  refusal(() => withLock(id, () => call("UpdateActionPointParent", { action_point_id: id, new_parent_id: parent })));
 
 /** Return the possible parents of a point: items with a pose, except its own descendants. */
 export function possibleParents(state: State, id: string): string[] {
@@ -93,7 +87,7 @@ export function possibleParents(state: State, id: string): string[] {
 /** Copy a point and its children `count` times, each one step further, in the frame of the parent. */
 export function copyPoint(id: string, count: number, step: Position): Promise<string> {
   return refusal(async () => {
-    const from = now().doc?.points[id]?.position;
+    const from = getState().doc?.points[id]?.position;
     if (!from) return;
     const together = newStep();
     for (let number = 1; number <= count; number++) {
@@ -106,49 +100,49 @@ export function copyPoint(id: string, count: number, step: Position): Promise<st
 /** Copy a point and its children to the other side of the origin of the parent, along an axis. Orientations stay. */
 export function mirrorPoint(id: string, axis: keyof Position): Promise<string> {
   return refusal(async () => {
-    const from = now().doc?.points[id]?.position;
+    const from = getState().doc?.points[id]?.position;
     if (from) await call("CopyActionPoint", { id, position: { ...from, [axis]: -from[axis] } }, newStep());
   });
 }
 
 export const removePoint = (id: string) => refusal(() => call("RemoveActionPoint", { id }));
 export const renamePoint = (id: string, new_name: string) =>
-  refusal(() => held(id, () => call("RenameActionPoint", { action_point_id: id, new_name })));
+  refusal(() => withLock(id, () => call("RenameActionPoint", { action_point_id: id, new_name })));
 
 // ------------------------------------------------------------------------------------------------ orientations
 export function addOrientation(point: string, orientation: Orientation, stem = "orientation"): Promise<string> {
-  const name = freeName(stem, namesAt(now().doc?.orientations, point));
+  const name = freeName(stem, namesAt(getState().doc?.orientations, point));
   return refusal(() =>
-    held(point, () => call("AddActionPointOrientation", { action_point_id: point, orientation, name })),
+    withLock(point, () => call("AddActionPointOrientation", { action_point_id: point, orientation, name })),
   );
 }
 
-export function addOrientationFromRobot(point: string, chosen: Chosen): Promise<string> {
-  const name = freeName("orientation", namesAt(now().doc?.orientations, point));
+export function addOrientationFromRobot(point: string, chosen: RobotSelection): Promise<string> {
+  const name = freeName("orientation", namesAt(getState().doc?.orientations, point));
   return refusal(() =>
-    held(point, () =>
+    withLock(point, () =>
       call("AddActionPointOrientationUsingRobot", { action_point_id: point, robot: robotArg(chosen), name }),
     ),
   );
 }
 
 export const turnOrientation = (id: string, orientation: Orientation) =>
-  refusal(() => held(id, () => call("UpdateActionPointOrientation", { orientation_id: id, orientation })));
-export const turnOrientationToRobot = (id: string, chosen: Chosen) =>
+  refusal(() => withLock(id, () => call("UpdateActionPointOrientation", { orientation_id: id, orientation })));
+export const turnOrientationToRobot = (id: string, chosen: RobotSelection) =>
   refusal(() =>
-    held(id, () => call("UpdateActionPointOrientationUsingRobot", { orientation_id: id, robot: robotArg(chosen) })),
+    withLock(id, () => call("UpdateActionPointOrientationUsingRobot", { orientation_id: id, robot: robotArg(chosen) })),
   );
 export const renameOrientation = (id: string, new_name: string) =>
-  refusal(() => held(id, () => call("RenameActionPointOrientation", { orientation_id: id, new_name })));
+  refusal(() => withLock(id, () => call("RenameActionPointOrientation", { orientation_id: id, new_name })));
 export const removeOrientation = (id: string) =>
   refusal(() => call("RemoveActionPointOrientation", { orientation_id: id }));
 
 // ------------------------------------------------------------------------------------------------ joints
 /** Return the point of a joint configuration, which has to be locked to edit it. */
-const pointOf = (joints: string): string => now().doc?.joints[joints]?.pointId ?? "";
+const pointOf = (joints: string): string => getState().doc?.joints[joints]?.pointId ?? "";
 
-export function addJointsFromRobot(point: string, { robotId, armId, effector }: Chosen): Promise<string> {
-  const name = freeName("joints", namesAt(now().doc?.joints, point));
+export function addJointsFromRobot(point: string, { robotId, armId, effector }: RobotSelection): Promise<string> {
+  const name = freeName("joints", namesAt(getState().doc?.joints, point));
   const args = {
     action_point_id: point,
     robot_id: robotId,
@@ -156,17 +150,17 @@ export function addJointsFromRobot(point: string, { robotId, armId, effector }: 
     end_effector_id: effector,
     ...(armId ? { arm_id: armId } : {}),
   };
-  return refusal(() => held(point, () => call("AddActionPointJointsUsingRobot", args)));
+  return refusal(() => withLock(point, () => call("AddActionPointJointsUsingRobot", args)));
 }
 
 export const setJoints = (id: string, joints: Joint[]) =>
-  refusal(() => held(pointOf(id), () => call("UpdateActionPointJoints", { joints_id: id, joints })));
+  refusal(() => withLock(pointOf(id), () => call("UpdateActionPointJoints", { joints_id: id, joints })));
 export const setJointsToRobot = (id: string) =>
-  refusal(() => held(pointOf(id), () => call("UpdateActionPointJointsUsingRobot", { joints_id: id })));
+  refusal(() => withLock(pointOf(id), () => call("UpdateActionPointJointsUsingRobot", { joints_id: id })));
 export const renameJoints = (id: string, new_name: string) =>
-  refusal(() => held(pointOf(id), () => call("RenameActionPointJoints", { joints_id: id, new_name })));
+  refusal(() => withLock(pointOf(id), () => call("RenameActionPointJoints", { joints_id: id, new_name })));
 export const removeJoints = (id: string) =>
-  refusal(() => held(pointOf(id), () => call("RemoveActionPointJoints", { joints_id: id })));
+  refusal(() => withLock(pointOf(id), () => call("RemoveActionPointJoints", { joints_id: id })));
 
 /**
  * Recompute the joints for an orientation of their point, close to the previous ones, so that the arm keeps its
@@ -174,7 +168,7 @@ export const removeJoints = (id: string) =>
  */
 export function solveJoints(id: string, orientationId: string): Promise<string> {
   return refusal(async () => {
-    const { doc, live } = now();
+    const { doc, live } = getState();
     const stored = doc?.joints[id];
     if (!doc || !stored) return;
     const effector =
@@ -188,6 +182,6 @@ export function solveJoints(id: string, orientationId: string): Promise<string> 
       start_joints: stored.joints,
       ...(stored.arm_id ? { arm_id: stored.arm_id } : {}),
     });
-    await held(stored.pointId, () => call("UpdateActionPointJoints", { joints_id: id, joints }));
+    await withLock(stored.pointId, () => call("UpdateActionPointJoints", { joints_id: id, joints }));
   });
 }

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { opened } from "../store/document";
+import { documentFrom } from "../store/document";
 import { initialState, type State } from "../store/state";
 import { notEditable } from "./program";
 
@@ -11,7 +11,7 @@ test("a program cannot be edited while the server has closed its project for a r
   };
   const state = initialState();
   const connection: State["connection"] = { ...state.connection, status: "ready" };
-  const doc = opened(scene, project);
+  const doc = documentFrom(scene, project);
   expect(notEditable({ ...state, connection, doc }, "RemoveAction")).toBe("");
   expect(notEditable({ ...state, connection, doc: { ...doc, closed: true } }, "RemoveAction")).not.toBe("");
 });

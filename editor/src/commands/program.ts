@@ -21,10 +21,10 @@ import { whyUnavailable } from "../store/permissions";
 import { scopeOf } from "../store/scope";
 import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
-import { notify, now, select, setUi, store } from "../store/store";
+import { getState, notify, select, setUi, store } from "../store/store";
 import { awaited } from "./awaited";
 import { addErrorExit } from "./errorExits";
-import { ask, held, newStep, refusal, sentence } from "./requests";
+import { ask, newStep, refusal, sentence, withLock } from "./requests";
 import { startingParameters, type Where } from "./startingValues";
 
 /** Return why a request cannot edit the program now; an empty string if it can. */
@@ -66,13 +66,13 @@ export async function addLoose(
   slot: Slot | null,
   step: CallOptions,
 ): Promise<string> {
-  const called = now().doc?.functions[objectId];
+  const called = getState().doc?.functions[objectId];
   const base = called?.name ?? meta.name;
-  const inFunction = (now().doc?.path.length ?? 0) > 0; // its actions need no point
+  const inFunction = (getState().doc?.path.length ?? 0) > 0; // its actions need no point
   const at = where ?? (inFunction ? { pointId: "" } : await anyPlace(objectId, slot, step));
   const pointId = "pointId" in at ? at.pointId : await newPoint(`${base}_point`, at.position, step);
   const parameters = await startingParameters(objectId, meta, pointId, at, step);
-  const { doc } = now();
+  const { doc } = getState();
   if (!doc) throw new Error(t`Open a project first. A scene has no program.`);
   const name = freeName(base, actionNames(doc));
   const outputs = called ? resultNames(doc, called) : newOutputs(doc, base, meta.returns.length);
@@ -85,22 +85,22 @@ export async function addLoose(
 /** Return the id of an object; for the name of a type, that of its first object, which is added if there is none. */
 async function serviceObject(object: string, step: CallOptions): Promise<string> {
   const of = (state: State) => Object.values(state.doc?.objects ?? {}).find((each) => each.type === object)?.id;
-  const { doc } = now();
+  const { doc } = getState();
   if (doc && (object in doc.objects || object in doc.functions)) return object;
-  const known = of(now());
+  const known = of(getState());
   if (known !== undefined) return known;
   const name = freeName(
     object.replace(/Actions$/, "").toLowerCase(),
     Object.values(doc?.objects ?? {}).map((each) => each.name),
   );
   // Undo cannot remove an object while the scene is online, and would refuse the whole step.
-  await call("AddSceneObject", { name, type: object }, now().live.state === "stopped" ? step : {});
+  await call("AddSceneObject", { name, type: object }, getState().live.state === "stopped" ? step : {});
   return awaited(of);
 }
 
 /** Return the point for an action without a place: that of its predecessor, or one on the device or in the world. */
 async function anyPlace(objectId: string, slot: Slot | null, step: CallOptions): Promise<Where> {
-  const { doc } = now();
+  const { doc } = getState();
   const before = doc?.actions[slot?.after ?? ""]?.pointId ?? Object.keys(doc?.points ?? {})[0];
   if (before !== undefined) return { pointId: before };
   const position = doc?.objects[objectId]?.pose?.position ?? { x: 0, y: 0, z: 0 };
@@ -109,7 +109,7 @@ async function anyPlace(objectId: string, slot: Slot | null, step: CallOptions):
 
 /** Connect a new action in a slot, before the actions that were there. */
 export async function insert(id: string, slot: Slot, step: CallOptions): Promise<void> {
-  const { doc } = now();
+  const { doc } = getState();
   if (!doc) return;
   const { redirect, branch, to } = insertion(doc, slot);
   const update = async (item: string, end: string, condition: ProjectLogicIf | undefined) => {
@@ -124,7 +124,7 @@ export async function insert(id: string, slot: Slot, step: CallOptions): Promise
 }
 
 async function newPoint(base: string, position: Position, step: CallOptions): Promise<string> {
-  const taken = Object.values(now().doc?.points ?? {}).map((each) => each.name);
+  const taken = Object.values(getState().doc?.points ?? {}).map((each) => each.name);
   const name = freeName(base, taken);
   await call("AddActionPoint", { name, position }, step);
   return (await awaited((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name))).id;
@@ -135,8 +135,8 @@ async function newPoint(base: string, position: Position, step: CallOptions): Pr
 /** Change a parameter. Return why it was refused, for the form. */
 export const setParameter = (actionId: string, parameter: ActionParameter): Promise<string> =>
   refusal(() =>
-    held(actionId, () => {
-      const action = now().doc?.actions[actionId];
+    withLock(actionId, () => {
+      const action = getState().doc?.actions[actionId];
       if (!action) throw new Error(t`The action no longer exists.`);
       const rest = action.parameters.filter((each) => each.name !== parameter.name);
       return call("UpdateAction", { action_id: actionId, parameters: [...rest, parameter] });
@@ -146,19 +146,19 @@ export const setParameter = (actionId: string, parameter: ActionParameter): Prom
 /** Name the results of an action. Return why it was refused. */
 export const nameResults = (actionId: string, outputs: string[]): Promise<string> =>
   refusal(() =>
-    held(actionId, () => call("UpdateAction", { action_id: actionId, flows: [{ type: "default", outputs }] })),
+    withLock(actionId, () => call("UpdateAction", { action_id: actionId, flows: [{ type: "default", outputs }] })),
   );
 
 /** Set the number of repetitions of a failed action; 0 removes the retry. Return the reason of a refusal. */
 export const setRetry = (actionId: string, retry: Retry): Promise<string> =>
-  refusal(() => held(actionId, () => call("UpdateAction", { action_id: actionId, retry })));
+  refusal(() => withLock(actionId, () => call("UpdateAction", { action_id: actionId, retry })));
 
 export const renameAction = (action_id: string, new_name: string): Promise<string> =>
-  refusal(() => held(action_id, () => call("RenameAction", { action_id, new_name })));
+  refusal(() => withLock(action_id, () => call("RenameAction", { action_id, new_name })));
 
 /** Add a copy of an action at the same point, with its retry, its own results, and without connections. */
 export async function duplicateAction(action: Action & { pointId: string }): Promise<void> {
-  const { doc } = now();
+  const { doc } = getState();
   if (!doc) return;
   const name = freeName(action.name, actionNames(doc));
   const count = action.flows[0]?.outputs.length ?? 0;
@@ -184,7 +184,7 @@ export async function duplicateAction(action: Action & { pointId: string }): Pro
 
 /** Remove an action and its connections by one edit. If it has one next step, its predecessors continue there. */
 export async function removeAction(id: string): Promise<void> {
-  const { doc } = now();
+  const { doc } = getState();
   const name = doc?.actions[id]?.name;
   if (!doc || name === undefined) return;
   const steps = outgoing(doc, id).length + incoming(doc, id).length;
@@ -208,12 +208,12 @@ export const cancelConnecting = (): void => setUi({ connecting: null });
 
 /** Finish the connection at an item. */
 export async function finishConnecting(to: string): Promise<void> {
-  const { connecting } = now().ui;
+  const { connecting } = getState().ui;
   if (!connecting) return;
   cancelConnecting();
   const { from, condition, item, error } = connecting;
   if (item !== undefined) {
-    const step = now().doc?.logic[item];
+    const step = getState().doc?.logic[item];
     if (step && (await updateStep(item, step.start, to, step.condition))) select({ kind: "logic", id: item });
   } else if (error) await addErrorExit(from, to);
   else await connect(from, to, condition);
@@ -221,7 +221,7 @@ export async function finishConnecting(to: string): Promise<void> {
 
 /** Connect `to` after `from`, under a free condition unless one is given. Notify the user if it is impossible. */
 export async function connect(from: string, to: string, condition?: ProjectLogicIf): Promise<void> {
-  const { doc, types } = now();
+  const { doc, types } = getState();
   if (!doc) return;
   const why = cannotLead(doc, from, to);
   if (why) return notify("info", why);
@@ -255,7 +255,7 @@ export const updateStep = (
 /** Like `updateStep`, for a form. */
 export const setCondition = (id: string, when: LogicWhen): Promise<string> =>
   refusal(() => {
-    const { doc, types } = now();
+    const { doc, types } = getState();
     const step = doc?.logic[id];
     if (!step) throw new Error(t`The connection no longer exists.`);
     return call("UpdateLogicItem", {
@@ -270,7 +270,7 @@ export const removeStep = (logic_item_id: string) => ask("RemoveLogicItem", { lo
 
 /** Show the puck of an action, START or END at a position, on this page only; undefined: at its own position. */
 export function showPuck(id: string, position: unknown): void {
-  const key = placeKey(now().doc, id);
+  const key = placeKey(getState().doc, id);
   store.setState(({ view }) => {
     const { [key]: _, ...rest } = view.shared;
     return { view: { ...view, shared: position ? { ...rest, [key]: position } : rest } };
@@ -279,9 +279,9 @@ export function showPuck(id: string, position: unknown): void {
 
 /** Move the puck of an action, START or END, for all users; null: back to its own position. */
 export async function placePuck(id: string, position: Position | null): Promise<void> {
-  const document = now().doc?.project?.id ?? "";
-  const key = placeKey(now().doc, id);
-  const before = now().view.shared[key];
+  const document = getState().doc?.project?.id ?? "";
+  const key = placeKey(getState().doc, id);
+  const before = getState().view.shared[key];
   // The server sends changes of the view state to everybody except the user who made them.
   showPuck(id, position);
   if (!(await ask("SetViewState", { scope: "shared", document, values: { [key]: position } }))) showPuck(id, before);

@@ -4,11 +4,11 @@ import { t } from "@lingui/core/macro";
 import { call } from "../session/connection";
 import { loadLists } from "../session/lists";
 import { rest } from "../session/rest";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 import { refusal } from "./requests";
 
 /** Return the objects that the problems of a scene name: the server starts each problem with the object's name. */
-export const namedObjects = (problems: readonly string[], names: readonly string[]): string[] =>
+const namedObjects = (problems: readonly string[], names: readonly string[]): string[] =>
   names.filter((name) => problems.some((each) => each.startsWith(`${name}: `)));
 
 interface StoredScene {
@@ -30,7 +30,7 @@ export async function faultyObjects(id: string, problems: readonly string[]): Pr
 /** Remove objects from a saved scene, after storing a backup. Return why it failed, or an empty string. */
 export function removeObjects(id: string, name: string, objects: readonly string[]): Promise<string> {
   return refusal(async () => {
-    const taken = new Set(now().lists.scenes?.map((each) => each.name));
+    const taken = new Set(getState().lists.scenes?.map((each) => each.name));
     let copy = t`${name} backup`;
     for (let number = 2; taken.has(copy); number++) copy = t`${name} backup ${number}`;
     const scene = await read(id);

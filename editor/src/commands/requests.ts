@@ -4,7 +4,7 @@ import type { CallOptions } from "../protocol/client";
 import { ConnectionLost, Refused } from "../protocol/errors";
 import type { Requests } from "../protocol/types";
 import { call } from "../session/connection";
-import { notify, now } from "../store/store";
+import { getState, notify } from "../store/store";
 
 /** Send a request. Return undefined after notifying the user if it was refused, lost or too late. */
 export async function ask<N extends keyof Requests>(
@@ -35,9 +35,9 @@ export async function whyNot<N extends keyof Requests>(request: N, args?: Reques
 }
 
 /** Lock an item for writing, unless this page has locked it. Return the function that releases it. */
-async function take(id: string, tree: boolean): Promise<() => Promise<void>> {
+async function acquireLock(id: string, tree: boolean): Promise<() => Promise<void>> {
   const key = tree ? `${id}/tree` : id;
-  const { locks } = now().runtime;
+  const { locks } = getState().runtime;
   const lock = locks.get(key) ?? { users: 0, granted: call("WriteLock", { object_id: id, lock_tree: tree }) };
   locks.set(key, lock);
   lock.users++;
@@ -60,10 +60,14 @@ async function take(id: string, tree: boolean): Promise<() => Promise<void>> {
 }
 
 /** Do something while holding the write lock of an item, and release it afterwards. */
-export async function holding<T>(id: string, work: () => Promise<T | undefined>, tree = false): Promise<T | undefined> {
+export async function withLockOrNotify<T>(
+  id: string,
+  work: () => Promise<T | undefined>,
+  tree = false,
+): Promise<T | undefined> {
   let releaseLock: () => Promise<void>;
   try {
-    releaseLock = await take(id, tree);
+    releaseLock = await acquireLock(id, tree);
   } catch (error) {
     notify(error instanceof ConnectionLost ? "warn" : "error", sentence(error));
     return undefined;
@@ -85,9 +89,9 @@ export async function refusal(work: () => Promise<unknown>): Promise<string> {
   }
 }
 
-/** Like `holding`, but reject with the refusal instead of notifying the user: for `refusal`. */
-export async function held<T>(id: string, work: () => Promise<T>, tree = false): Promise<T> {
-  const releaseLock = await take(id, tree);
+/** Like `withLockOrNotify`, but reject with the refusal instead of notifying the user: for `refusal`. */
+export async function withLock<T>(id: string, work: () => Promise<T>, tree = false): Promise<T> {
+  const releaseLock = await acquireLock(id, tree);
   try {
     return await work();
   } finally {

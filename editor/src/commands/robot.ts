@@ -7,14 +7,14 @@ import { robotsOf } from "../session/streams";
 import { stable } from "../store/memo";
 import { whyUnavailable } from "../store/permissions";
 import type { Arm, State } from "../store/state";
-import { now, setUi } from "../store/store";
+import { getState, setUi } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import type { Ghost, MotionOptions } from "../store/ui";
-import { held, refusal, sentence } from "./requests";
+import { refusal, sentence, withLock } from "./requests";
 import { storeViewState } from "./viewstate";
 
 /** A robot, its arm (empty if it has one) and its end effector (empty if unknown). */
-export interface Chosen {
+export interface RobotSelection {
   robotId: string;
   armId: string;
   effector: string;
@@ -22,13 +22,13 @@ export interface Chosen {
 
 /** Return the active robot: the robot that the user chose last, otherwise the first; null without a robot. */
 export const chosenRobot = stable(
-  found,
+  findRobot,
   (one, other) => one?.robotId === other?.robotId && one?.armId === other?.armId && one?.effector === other?.effector,
 );
 
-function found(state: State): Chosen | null {
+function findRobot(state: State): RobotSelection | null {
   const robots = robotsOf(state);
-  const last = (state.view.user.last_robot ?? {}) as Partial<Record<keyof Chosen, unknown>>;
+  const last = (state.view.user.last_robot ?? {}) as Partial<Record<keyof RobotSelection, unknown>>;
   const robotId = robots.find((each) => each === last.robotId) ?? robots[0];
   if (robotId === undefined) return null;
   const arms = state.live.arms[robotId] ?? [];
@@ -37,12 +37,12 @@ function found(state: State): Chosen | null {
   return { robotId, armId: arm?.id ?? "", effector: effector ?? "" };
 }
 
-export function chooseRobot(chosen: Chosen): void {
+export function chooseRobot(chosen: RobotSelection): void {
   setUi({ ghost: null });
   storeViewState("user", { last_robot: chosen });
 }
 
-export function armOf(state: State, { robotId, armId }: Chosen): Arm | undefined {
+export function armOf(state: State, { robotId, armId }: RobotSelection): Arm | undefined {
   return state.live.arms[robotId]?.find((each) => each.id === armId);
 }
 
@@ -51,14 +51,14 @@ export function featuresOf(state: State, robotId: string): RobotFeatures | undef
 }
 
 /** Return the robot as requests about points and objects name it. */
-export function robotArg({ robotId, armId, effector }: Chosen): RobotArg {
+export function robotArg({ robotId, armId, effector }: RobotSelection): RobotArg {
   return { robot_id: robotId, end_effector: effector, ...ofArm(armId) };
 }
 
 const ofArm = (armId: string) => (armId ? { arm_id: armId } : {});
 
 /** Return the last reported end effector pose; undefined if unknown or outdated. */
-export function effectorPose({ robotId, armId, effector }: Chosen): Pose | undefined {
+export function effectorPose({ robotId, armId, effector }: RobotSelection): Pose | undefined {
   return telemetry
     .endEffectors(robotId)
     .find((each) => each.end_effector_id === effector && (each.arm_id ?? "") === armId)?.pose;
@@ -67,7 +67,7 @@ export function effectorPose({ robotId, armId, effector }: Chosen): Pose | undef
 /** Return why the robot cannot be moved now; an empty string if it can. */
 export function notReady(
   state: State,
-  chosen: Chosen | null,
+  chosen: RobotSelection | null,
   request: Parameters<typeof whyUnavailable>[1] = "MoveToPose",
 ): string {
   if (!chosen) return t`The scene has no robot.`;
@@ -96,7 +96,7 @@ export interface Step {
 
 /** Return the reason if the step was refused, otherwise an empty string. */
 export function stepEffector(
-  { robotId, armId, effector }: Chosen,
+  { robotId, armId, effector }: RobotSelection,
   { pose, ...step }: Step,
   options: MotionOptions,
 ): Promise<string> {
@@ -108,17 +108,17 @@ export function stepEffector(
     ...options,
     ...ofArm(armId),
   };
-  return refusal(() => held(robotId, () => call("StepRobotEef", args, { deadline: 30 })));
+  return refusal(() => withLock(robotId, () => call("StepRobotEef", args, { deadline: 30 })));
 }
 
-export function alignDown({ robotId, armId, effector }: Chosen, options: MotionOptions): Promise<string> {
+export function alignDown({ robotId, armId, effector }: RobotSelection, options: MotionOptions): Promise<string> {
   const args = { robot_id: robotId, end_effector_id: effector, ...options, ...ofArm(armId) };
-  return refusal(() => held(robotId, () => call("SetEefPerpendicularToWorld", args, { deadline: 30 })));
+  return refusal(() => withLock(robotId, () => call("SetEefPerpendicularToWorld", args, { deadline: 30 })));
 }
 
 /** Move to a pose in the world; omitted parts stay. */
 export function moveToPose(
-  { robotId, armId, effector }: Chosen,
+  { robotId, armId, effector }: RobotSelection,
   pose: Partial<Pose>,
   options: MotionOptions,
 ): Promise<string> {
@@ -132,7 +132,7 @@ export function moveToPose(
 }
 
 export function moveToJoints(
-  { robotId, armId }: Chosen,
+  { robotId, armId }: RobotSelection,
   joints: Joint[],
   { speed, safe }: MotionOptions,
 ): Promise<string> {
@@ -143,7 +143,7 @@ export function moveToJoints(
 
 /** Move to an orientation or to joints of a point. */
 export function moveToTaught(
-  { robotId, armId, effector }: Chosen,
+  { robotId, armId, effector }: RobotSelection,
   goal: { orientation_id: string } | { joints_id: string },
   options: MotionOptions,
 ): Promise<string> {
@@ -159,7 +159,7 @@ export function acknowledgeStop(object_id: string): Promise<string> {
 }
 
 // ------------------------------------------------------------------------------------------------ ghost
-export interface Showing {
+interface GhostOptions {
   /** Return whether the answer is still needed; by default it is. */
   current?: () => boolean;
   /** Whether the ghost is kept and marked as impossible if there are no joints for the pose. */
@@ -170,10 +170,10 @@ export interface Showing {
  * Show the robot at a pose in the world. Return why it cannot be there, or an empty string. A pose in collision is
  * shown too, if there are joints for it.
  */
-export async function showAt(
-  chosen: Chosen,
+export async function showGhostAt(
+  chosen: RobotSelection,
   pose: Pose,
-  { current = () => true, keep = false }: Showing = {},
+  { current = () => true, keep = false }: GhostOptions = {},
 ): Promise<string> {
   const ask = (avoid_collisions: boolean) =>
     call("InverseKinematics", {
@@ -190,23 +190,23 @@ export async function showAt(
   } catch (error) {
     const problem = sentence(error);
     const joints = await ask(false).catch(() => null);
-    const before = now().ui.ghost;
+    const before = getState().ui.ghost;
     if (joints) show({ robotId: chosen.robotId, joints, problem });
     else show(keep && before?.robotId === chosen.robotId ? { ...before, problem } : null);
     return problem;
   }
 }
 
-export function showJoints(robotId: string, joints: Joint[], problem = ""): void {
+export function showGhostJoints(robotId: string, joints: Joint[], problem = ""): void {
   setUi({ ghost: { robotId, joints, problem } });
 }
 
 /** Show the ghost of the robot with its base at a pose in the world. */
-export function showStanding(robotId: string, at: Pose): void {
+export function showGhostWithBase(robotId: string, at: Pose): void {
   const joints = [...(telemetry.latest(robotId)?.joints ?? [])].map(([name, value]) => ({ name, value }));
   setUi({ ghost: { robotId, joints, problem: "", at } });
 }
 
 export function hideGhost(): void {
-  if (now().ui.ghost) setUi({ ghost: null });
+  if (getState().ui.ghost) setUi({ ghost: null });
 }

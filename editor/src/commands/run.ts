@@ -6,7 +6,7 @@ import { call, serves } from "../session/connection";
 import { whyUnavailable } from "../store/permissions";
 import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
-import { notify, now } from "../store/store";
+import { getState, notify } from "../store/store";
 import { ask, sentence } from "./requests";
 
 /** Time limit, s. A build copies the code of the drivers, which takes time on a busy computer. */
@@ -23,16 +23,16 @@ export function notRunnable(state: State): string {
 }
 
 /** Options of a run: a failed action holds the program, so that a person can decide how it continues. */
-const holding = () => (serves("DecideHeld") ? { on_error: "hold" as const } : {});
+const holdOnError = () => (serves("DecideHeld") ? { on_error: "hold" as const } : {});
 
 /** Run the open project; save it first if necessary. Return whether it was started. */
 export async function run({ paused = false } = {}): Promise<boolean> {
   try {
-    if (now().doc?.unsaved) await call("SaveProject");
+    if (getState().doc?.unsaved) await call("SaveProject");
     const shared = serves("SetBreakpoints")
       ? { shared_breakpoints: true }
-      : { breakpoints: Object.keys(now().breakpoints) };
-    await call("TemporaryPackage", { start_paused: paused, ...shared, ...holding() }, { deadline: BUILD_TIMEOUT });
+      : { breakpoints: Object.keys(getState().breakpoints) };
+    await call("TemporaryPackage", { start_paused: paused, ...shared, ...holdOnError() }, { deadline: BUILD_TIMEOUT });
     return true;
   } catch (error) {
     notify("error", t`Not started. ${sentence(error)}`);
@@ -51,7 +51,7 @@ export const runPackage = (id: string, paused = false, continues = false, recipe
       id,
       start_paused: paused,
       ...(serves("SetBreakpoints") ? { shared_breakpoints: true } : {}),
-      ...holding(),
+      ...holdOnError(),
       ...(continues && { continues }),
       ...recipe,
     },
@@ -70,7 +70,7 @@ export const stop = () => ask("StopPackage");
 
 /** Build a package of the open project; save it first if necessary. */
 export async function build(name: string): Promise<boolean> {
-  const { doc } = now();
+  const { doc } = getState();
   if (!doc?.project) return false;
   if (doc.unsaved && !(await ask("SaveProject"))) return false;
   const built = await ask(
@@ -84,11 +84,11 @@ export async function build(name: string): Promise<boolean> {
 
 /** Set or remove the breakpoint of a point or action, also while the program is running. */
 export const breakAt = (id: string, on: boolean) =>
-  ask("SetBreakpoints", { ...(on ? { add: [id] } : { remove: [id] }), project_id: now().doc?.project?.id });
+  ask("SetBreakpoints", { ...(on ? { add: [id] } : { remove: [id] }), project_id: getState().doc?.project?.id });
 
 /** Run, and pause before this action. */
 export async function runTo(id: string): Promise<void> {
-  if (!(id in now().breakpoints) && !(await breakAt(id, true))) return;
+  if (!(id in getState().breakpoints) && !(await breakAt(id, true))) return;
   await run();
 }
 

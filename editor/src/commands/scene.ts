@@ -20,12 +20,12 @@ import { call } from "../session/connection";
 import { whyUnavailable } from "../store/permissions";
 import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
-import { notify, now, select, setUi } from "../store/store";
+import { getState, notify, select, setUi } from "../store/store";
 import { lifted } from "../transform/sizes";
 import { ORIGIN, plus, rotated } from "../viewmodel/frames";
 import { awaited } from "./awaited";
 import { aimedPlace } from "./crosshair";
-import { ask, held, refusal, sentence } from "./requests";
+import { ask, refusal, sentence, withLock } from "./requests";
 
 /** Requests that are also possible while the scene is online. */
 const ONLINE: ReadonlySet<keyof Requests> = new Set<keyof Requests>(["AddSceneObject"]);
@@ -47,15 +47,15 @@ export function notBuildable(state: State, request: keyof Requests): string {
 
 /** Return a name that no other object and no type has. */
 export function freeObjectName(base: string): string {
-  const { doc, types } = now();
+  const { doc, types } = getState();
   const clean = base.replace(/\W/g, "_").replace(/^(\d)/, "_$1") || "object";
   return freeName(clean, [...Object.values(doc?.objects ?? {}).map((each) => each.name), ...Object.keys(types.byName)]);
 }
 
 /** Return the pose of a new object: on the surface in the middle of the view, upright; the first one at the origin. */
-export function newPlace(model?: ObjectModel): Pose {
+function newPlace(model?: ObjectModel): Pose {
   const aimed = aimedPlace();
-  if (!aimed || !Object.values(now().doc?.objects ?? {}).some((each) => each.pose)) return ORIGIN;
+  if (!aimed || !Object.values(getState().doc?.objects ?? {}).some((each) => each.pose)) return ORIGIN;
   const into = rotated({ x: 0, y: 0, z: 1 }, aimed.orientation);
   const out = { x: -into.x, y: -into.y, z: -into.z };
   const fine = (value: number) => Math.round(value * 1e4) / 1e4;
@@ -64,7 +64,7 @@ export function newPlace(model?: ObjectModel): Pose {
 }
 
 /** Wait for the new object and select it. */
-async function taken(name: string): Promise<void> {
+async function selectNewObject(name: string): Promise<void> {
   const added = await awaited((state) => Object.values(state.doc?.objects ?? {}).find((each) => each.name === name));
   select({ kind: "object", id: added.id });
   setUi({ tool: "" });
@@ -74,7 +74,7 @@ export function addObject(type: ObjectTypeMeta, name: string, parameters: Parame
   const pose = type.has_pose ? { pose: newPlace(type.object_model) } : {};
   return refusal(async () => {
     await call("AddSceneObject", { name, type: type.type, parameters, ...pose, ...(node ? { node } : {}) });
-    await taken(name);
+    await selectNewObject(name);
   });
 }
 
@@ -97,7 +97,7 @@ export async function checkConnection(
 }
 
 /** Time limit of a search, s; the server has a shorter one. */
-const FOUND_WITHIN = 30;
+const SEARCH_TIMEOUT = 30;
 
 /** Search for values of a setting of a device, or return why it failed. */
 export async function findDevices(
@@ -107,7 +107,7 @@ export async function findDevices(
   addresses = "",
 ): Promise<{ found: FoundDevice[] } | { refused: string }> {
   try {
-    return { found: await call("FindDevices", { type, setting, parameters, addresses }, { deadline: FOUND_WITHIN }) };
+    return { found: await call("FindDevices", { type, setting, parameters, addresses }, { deadline: SEARCH_TIMEOUT }) };
   } catch (error) {
     return { refused: sentence(error) };
   }
@@ -116,7 +116,7 @@ export async function findDevices(
 export type ShapeKind = "table" | "box" | "cylinder" | "sphere";
 
 /** A shape of 10 cm, or a table top of 1.2 m by 0.8 m; `id` becomes the name of its type. */
-export function shapeModel(kind: ShapeKind, id: string): ObjectModel {
+function shapeModel(kind: ShapeKind, id: string): ObjectModel {
   const size = 0.1;
   if (kind === "table") return { type: "Box", box: { id, size_x: 1.2, size_y: 0.8, size_z: 0.04 } };
   if (kind === "box") return { type: "Box", box: { id, size_x: size, size_y: size, size_z: size } };
@@ -138,7 +138,7 @@ export async function addShape(kind: ShapeKind): Promise<void> {
 function addModel(name: string, model: ObjectModel, pose = newPlace(model)): Promise<string> {
   return refusal(async () => {
     await call("AddSceneShape", { name, pose, model });
-    await taken(name);
+    await selectNewObject(name);
   });
 }
 
@@ -152,29 +152,29 @@ export function addMesh(name: string, file: File): Promise<string> {
 }
 
 export const renameObject = (id: string, new_name: string): Promise<string> =>
-  refusal(() => held(id, () => call("RenameObject", { id, new_name })));
+  refusal(() => withLock(id, () => call("RenameObject", { id, new_name })));
 
 /** Add a copy next to the object; the copy of a shape has its own type. */
 export async function duplicateObject({ name, type, pose, parameters, node }: SceneObject): Promise<void> {
-  const { types } = now();
+  const { types } = getState();
   const meta = types.byName[type];
   const copy = freeObjectName(name.replace(/_\d+$/, ""));
-  const beside = pose && { ...pose, position: plus(pose.position, { x: 0.1, y: 0.1, z: 0 }) };
-  const own = meta?.base === "VirtualCollisionObject" && meta.object_model && beside;
+  const nextTo = pose && { ...pose, position: plus(pose.position, { x: 0.1, y: 0.1, z: 0 }) };
+  const own = meta?.base === "VirtualCollisionObject" && meta.object_model && nextTo;
   const done = own
     ? await ask("AddSceneShape", {
         name: copy,
-        pose: beside,
+        pose: nextTo,
         model: named(meta.object_model as ObjectModel, copy),
       })
     : await ask("AddSceneObject", {
         name: copy,
         type,
         parameters,
-        ...(beside ? { pose: beside } : {}),
+        ...(nextTo ? { pose: nextTo } : {}),
         ...(node ? { node } : {}),
       });
-  if (done) await taken(copy).catch(() => {}); // another user has removed it
+  if (done) await selectNewObject(copy).catch(() => {}); // another user has removed it
 }
 
 /** Return the same model with another type name. */
@@ -189,18 +189,18 @@ export function named(model: ObjectModel, id: string): ObjectModel {
 /** Return the names of the projects that use an object. */
 export async function projectsUsing(id: string): Promise<string[]> {
   const ids = await call("SceneObjectUsage", { id });
-  return ids.map((each) => now().lists.projects?.find((one) => one.id === each)?.name ?? each);
+  return ids.map((each) => getState().lists.projects?.find((one) => one.id === each)?.name ?? each);
 }
 
 export const removeObject = (id: string, force = false) => ask("RemoveFromScene", { id, force });
 
 export const setParameters = (id: string, parameters: Parameter[]): Promise<string> =>
-  refusal(() => held(id, () => call("UpdateSceneObjectSettings", { id, parameters })));
+  refusal(() => withLock(id, () => call("UpdateSceneObjectSettings", { id, parameters })));
 
 /** Return the names of the scenes that use a type. */
 export async function scenesUsing(type: string): Promise<string[]> {
   const ids = await call("ObjectTypeUsage", { id: type });
-  return ids.map((each) => now().lists.scenes?.find((one) => one.id === each)?.name ?? each);
+  return ids.map((each) => getState().lists.scenes?.find((one) => one.id === each)?.name ?? each);
 }
 
 export const deleteType = (type: string): Promise<string> => refusal(() => call("DeleteObjectTypes", [type]));

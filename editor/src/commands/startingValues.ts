@@ -1,20 +1,20 @@
 /** Values for the parameters of new actions, and the values that devices offer. */
 
 import { t } from "@lingui/core/macro";
-import { compared } from "../formats";
+import { compareTexts } from "../formats";
 import { needsPlace } from "../program/chain";
 import { decoded } from "../program/decoded";
 import { calledBy, metaOf, PASSED_ON } from "../program/logic";
 import { freeName } from "../program/naming";
-import { initial } from "../program/values";
+import { initialValue } from "../program/values";
 import type { CallOptions } from "../protocol/client";
 import type { ActionParameter, ObjectAction, Orientation, Position } from "../protocol/types";
 import { call } from "../session/connection";
 import { put } from "../store/records";
 import type { State } from "../store/state";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 import { awaited } from "./awaited";
-import { held } from "./requests";
+import { withLock } from "./requests";
 
 /** The place for a new action: a point, or a position in the world, where a point is added. */
 export type Where = { pointId: string; orientationId?: string } | { position: Position; orientation: Orientation };
@@ -26,10 +26,10 @@ async function orientationOf(pointId: string, where: Where, step: CallOptions): 
   if ("pointId" in where && where.orientationId) return where.orientationId;
   const on = (state: State) =>
     Object.values(state.doc?.orientations ?? {}).find((each) => each.pointId === pointId)?.id;
-  const there = on(now());
+  const there = on(getState());
   if (there) return there;
   const orientation = "orientation" in where ? where.orientation : DOWN;
-  await held(pointId, () =>
+  await withLock(pointId, () =>
     call("AddActionPointOrientation", { action_point_id: pointId, orientation, name: "default" }, step),
   );
   return awaited(on);
@@ -39,13 +39,13 @@ async function orientationOf(pointId: string, where: Where, step: CallOptions): 
 async function jointsOf(pointId: string, robotId: string, step: CallOptions): Promise<string> {
   const on = (state: State) =>
     Object.values(state.doc?.joints ?? {}).find((each) => each.pointId === pointId && each.robot_id === robotId)?.id;
-  const there = on(now());
+  const there = on(getState());
   if (there) return there;
-  const taken = Object.values(now().doc?.joints ?? {})
+  const taken = Object.values(getState().doc?.joints ?? {})
     .filter((each) => each.pointId === pointId)
     .map((each) => each.name);
   const name = freeName("default", taken);
-  await held(pointId, () =>
+  await withLock(pointId, () =>
     call("AddActionPointJointsUsingRobot", { action_point_id: pointId, robot_id: robotId, name }, step),
   );
   return awaited(on);
@@ -76,7 +76,7 @@ export async function startingParameters(
             ? JSON.stringify(pointId)
             : await startingValue(objectId, wanted);
     if (value === undefined) {
-      const other = imageFor(type);
+      const other = resultLinkFor(type);
       if (!other) throw new Error(t`${name} is the result of another action. Add that action first.`);
       parameters.push({ name, type: "link", value: JSON.stringify(other) });
     } else parameters.push({ name, type, value });
@@ -86,7 +86,7 @@ export async function startingParameters(
 
 /** Return the value of a parameter in another call of the function, unless only that call can use it. */
 function lastGiven(functionId: string, name: string): ActionParameter | undefined {
-  const { doc } = now();
+  const { doc } = getState();
   if (!doc?.functions[functionId]) return undefined;
   const given = [doc.program, ...Object.values(doc.functions)]
     .flatMap(({ actions }) => Object.values(actions))
@@ -97,7 +97,7 @@ function lastGiven(functionId: string, name: string): ActionParameter | undefine
 
 /** Return the robot whose joints a parameter takes: that of the first action of the function that uses it. */
 function robotFor(objectId: string, name: string): string {
-  const { doc } = now();
+  const { doc } = getState();
   for (const action of Object.values(doc?.functions[objectId]?.actions ?? {})) {
     const use = action.parameters.find((each) => each.type === PASSED_ON && decoded(each.value) === name);
     if (use) return robotFor(action.type.split("/")[0] ?? "", use.name);
@@ -117,12 +117,12 @@ async function startingValue(
     const values = await dynamicValues(objectId, wanted.name, []).catch(() => null);
     if (values?.[0] !== undefined) return JSON.stringify(values[0]);
   }
-  return initial(wanted);
+  return initialValue(wanted);
 }
 
 /** Return a link to a stored result of a type; undefined if there is none. */
-function imageFor(type: string): string | undefined {
-  const { doc, types } = now();
+function resultLinkFor(type: string): string | undefined {
+  const { doc, types } = getState();
   for (const action of Object.values(doc?.actions ?? {})) {
     const index = (doc && metaOf(types, doc, action)?.returns.indexOf(type)) ?? -1;
     if (index >= 0 && action.flows[0]?.outputs[index]) return `${action.id}/default/${index}`;
@@ -138,7 +138,7 @@ export function lastDynamicValues(
   name: string,
   parents: { id: string; value: string }[],
 ): string[] | undefined {
-  return now().dynamicValues[dynamicKey(objectId, name, parents)];
+  return getState().dynamicValues[dynamicKey(objectId, name, parents)];
 }
 
 /** Return the possible values of a parameter according to the device. Reject if it cannot be reached. */
@@ -148,7 +148,7 @@ export async function dynamicValues(
   parents: { id: string; value: string }[],
 ): Promise<string[]> {
   const found = await call("ActionParamValues", { id: objectId, param_id: name, parent_params: parents });
-  const values = [...found].sort((a, b) => compared(a, b));
+  const values = [...found].sort((a, b) => compareTexts(a, b));
   store.setState((state) => ({ dynamicValues: put(state.dynamicValues, dynamicKey(objectId, name, parents), values) }));
   return values;
 }

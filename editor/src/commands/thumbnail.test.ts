@@ -1,5 +1,5 @@
 import { beforeEach, expect, test, vi } from "vitest";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 
 const call = vi.fn();
 vi.mock("../session/connection", () => ({ call, serves: () => true }));
@@ -17,11 +17,11 @@ test("a thumbnail that is stored while another answer is under way stays", async
   answer({ values: {} });
   await vi.waitFor(() => expect(call).toHaveResolved());
   await Promise.resolve();
-  expect(now().thumbnails.pro_1?.picture).toBe(TAKEN);
+  expect(getState().thumbnails.pro_1?.picture).toBe(TAKEN);
 });
 
 test("a thumbnail is loaded", async () => {
   call.mockResolvedValue({ values: { thumbnail: TAKEN } });
   loadThumbnailOnce("pro_1", "11:00");
-  await vi.waitFor(() => expect(now().thumbnails.pro_1?.picture).toBe(TAKEN));
+  await vi.waitFor(() => expect(getState().thumbnails.pro_1?.picture).toBe(TAKEN));
 });

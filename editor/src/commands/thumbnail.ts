@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/connection";
 import { put } from "../store/records";
 import type { Thumbnail } from "../store/state";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 import { refusal } from "./requests";
 
 /** Size in pixels, and largest number of characters. */
@@ -21,17 +21,17 @@ function setThumbnail(document: string, thumbnail: Thumbnail): void {
 }
 
 /** Store a picture of the view as the thumbnail of a document, even if the document is then closed. */
-export async function keepThumbnail(document: string, picture: Promise<Blob | null>): Promise<void> {
+export async function storeThumbnail(document: string, picture: Promise<Blob | null>): Promise<void> {
   const blob = serves("SetViewState") ? await picture : null;
   if (!blob) return;
   const thumbnail = await smaller(blob);
   if (!thumbnail) return;
-  if (!now().thumbnails[document]?.own) setThumbnail(document, { picture: thumbnail, own: false });
+  if (!getState().thumbnails[document]?.own) setThumbnail(document, { picture: thumbnail, own: false });
   await call("SetViewState", { scope: "shared", document, values: { thumbnail } });
 }
 
 /** Store a picture chosen by the user for a document; null: use the view again. Return why it failed. */
-export function keepOwnPicture(document: string, file: Blob | null): Promise<string> {
+export function storeOwnPicture(document: string, file: Blob | null): Promise<string> {
   return refusal(async () => {
     const picture = file && (await smaller(file, 1));
     if (picture === "") throw new Error(t`The picture is too large.`);
@@ -42,7 +42,7 @@ export function keepOwnPicture(document: string, file: Blob | null): Promise<str
 
 /** Request the thumbnail of a document that was saved at `time`, unless it was requested before. */
 export function loadThumbnailOnce(document: string, time: string): void {
-  const { thumbnailTimes } = now().runtime;
+  const { thumbnailTimes } = getState().runtime;
   if (thumbnailTimes.get(document) === time) return;
   thumbnailTimes.set(document, time);
   // The tile shows the old picture, or none.
@@ -51,13 +51,13 @@ export function loadThumbnailOnce(document: string, time: string): void {
 
 async function loadThumbnail(document: string): Promise<void> {
   if (!serves("GetViewState")) return;
-  const before = now().thumbnails[document];
+  const before = getState().thumbnails[document];
   const { values } = await call("GetViewState", { scope: "shared", document });
   const { thumbnail, picture } = values as { thumbnail?: unknown; picture?: unknown };
   const [own, taken] = [picture, thumbnail].map((each) =>
     typeof each === "string" && each.startsWith("data:image/") ? each : "",
   );
-  const known = now().thumbnails[document];
+  const known = getState().thumbnails[document];
   // After a quick close, the thumbnail of the save may be taken, or be under way to the server, before this answer.
   if (!own && !taken && (known !== before || (known && !known.own))) return;
   setThumbnail(document, { picture: own || taken || "", own: !!own });

@@ -3,7 +3,7 @@
 import type { ViewScope } from "../protocol/types";
 import { call, serves } from "../session/connection";
 import { openId } from "../store/selectors";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 
 /** Store values of the open document by their keys; null removes one. They take effect at once. */
 export function storeViewState(scope: ViewScope, values: Record<string, unknown>): void {
@@ -14,7 +14,7 @@ export function storeViewState(scope: ViewScope, values: Record<string, unknown>
   });
   if (!serves("SetViewState")) return;
   // Lost with the connection: after the reconnect the server sends the old values.
-  call("SetViewState", { scope, document: openId(now()), values }).catch(() => {});
+  call("SetViewState", { scope, document: openId(getState()), values }).catch(() => {});
 }
 
 /** Store values that belong to no document, by their keys: of the user, such as favorites, or of all users. */

@@ -9,7 +9,7 @@ import { meshesOf, type Thing } from "./thing";
 /** Radius of the search around the crosshair, pixels. */
 export const CONE = 56;
 /** Largest number of candidates. */
-export const MAX_CANDIDATES = 8;
+const MAX_CANDIDATES = 8;
 /** Weights of size and distance relative to the distance from the crosshair. */
 const LARGE = 0.5;
 const FAR = 0.3;
@@ -21,7 +21,7 @@ const TURNS = 8;
 /** A part of an item: a box in its own frame, or a sphere. */
 export type Target = { id: string } & ({ box: Box3; frame: Matrix4 } | { centre: Vector3; radius: number });
 
-export interface Candidate {
+interface Candidate {
   id: string;
   /** Angle between the crosshair and its closest point, rad. */
   off: number;

@@ -8,7 +8,7 @@ const LONGEST = 0.1;
 
 export class Animation {
   private readonly moving = new Set<Thing>();
-  private readonly calm = window.matchMedia("(prefers-reduced-motion: reduce)");
+  private readonly reducedMotion = window.matchMedia("(prefers-reduced-motion: reduce)");
 
   /** `draw` requests a frame, `changed` a frame in which everything is placed again. */
   constructor(
@@ -19,7 +19,7 @@ export class Animation {
 
   /** Move the parts of a model; at once at low quality, or if the user wants no motion. */
   add(thing: Thing): void {
-    if (this.quality === "low" || this.calm.matches) {
+    if (this.quality === "low" || this.reducedMotion.matches) {
       thing.step(Infinity);
       return this.changed();
     }

@@ -134,8 +134,8 @@ varying vec3 vUpper;
 varying vec3 vUp;
 void main() {
   float tilt = max( length( vUp.xy ), 1e-4 );
-  vec2 way = vUp.xy / tilt;
-  float across = vPlace.x * way.y - vPlace.y * way.x, along = dot( vPlace, way );
+  vec2 direction = vUp.xy / tilt;
+  float across = vPlace.x * direction.y - vPlace.y * direction.x, along = dot( vPlace, direction );
   float front = vUp.z * sqrt( max( 0.0, 1.0 - across * across ) ), edge = tilt * FLAT;
   if ( abs( along ) > edge + front ) discard;
   gl_FragColor = vec4( along > edge - front ? vUpper : vShade, 1.0 );
@@ -174,7 +174,7 @@ const SQUARE = [-1, -1, 1, -1, 1, 1, -1, 1];
 
 export class Baked {
   private readonly mesh: Mesh;
-  private room = 0;
+  private capacity = 0;
 
   /**
    * Draw `shape` at every instance, in a material with vertex colours; spheres or pucks with a radius of `ball`, m, if
@@ -195,7 +195,7 @@ export class Baked {
   }
 
   refresh(instances: readonly Instance[]): void {
-    if (instances.length > this.room) this.makeRoom(instances.length * 2);
+    if (instances.length > this.capacity) this.grow(instances.length * 2);
     this.mesh.visible = instances.length > 0;
     if (instances.length === 0) return;
     const { geometry } = this.mesh;
@@ -242,8 +242,8 @@ export class Baked {
     return this.ball > 0 ? 6 : (this.shape.index?.count ?? this.shape.getAttribute("position").count);
   }
 
-  private makeRoom(instances: number): void {
-    this.room = instances;
+  private grow(instances: number): void {
+    this.capacity = instances;
     const index =
       this.ball > 0
         ? [0, 1, 2, 0, 2, 3]

@@ -28,7 +28,7 @@ export class Batch {
     private readonly material: Material,
     private readonly baked: Baked | null,
   ) {
-    this.mesh = this.made(FIRST_SIZE);
+    this.mesh = this.createMesh(FIRST_SIZE);
   }
 
   add(instance: Instance): void {
@@ -47,7 +47,7 @@ export class Batch {
     if (this.instances.length > this.mesh.instanceMatrix.count) {
       this.scene.remove(this.mesh);
       this.mesh.dispose();
-      this.mesh = this.made(this.instances.length * 2);
+      this.mesh = this.createMesh(this.instances.length * 2);
     }
     this.mesh.count = this.instances.length;
     this.mesh.visible = this.mesh.count > 0 && !this.baked;
@@ -69,7 +69,7 @@ export class Batch {
     this.material.dispose();
   }
 
-  private made(size: number): InstancedMesh {
+  private createMesh(size: number): InstancedMesh {
     const mesh = new InstancedMesh(this.geometry, this.material, size);
     mesh.instanceMatrix.setUsage(DynamicDrawUsage);
     mesh.setColorAt(0, new Color(1, 1, 1)); // creates the attribute, so that the shader is compiled only once

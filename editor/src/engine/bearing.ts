@@ -3,7 +3,7 @@
 import { type PerspectiveCamera, Vector3 } from "three";
 import type { Engine } from "./engine";
 
-export interface Bearing {
+interface Bearing {
   /** Pixels from the upper left corner of the view; for an item outside the view, a point on the line towards it. */
   x: number;
   y: number;

@@ -166,7 +166,7 @@ export class View {
   }
 
   /** Look at the target from a side. */
-  look(from: ViewName): void {
+  lookFrom(from: ViewName): void {
     if (this.measured) return;
     this.setMode("orbit");
     const distance = this.camera.position.distanceTo(this.controls.target);

@@ -37,7 +37,10 @@ export function axesOf(link: URDFLink): Axis[] {
 }
 
 /** Return the shapes of a link as one geometry with colours. `pieces` are its primitive shapes in its frame. */
-export function dressed(pieces: readonly { mesh: Mesh; matrix: Matrix4 }[], axes: readonly Axis[]): BufferGeometry {
+export function linkGeometry(
+  pieces: readonly { mesh: Mesh; matrix: Matrix4 }[],
+  axes: readonly Axis[],
+): BufferGeometry {
   const parts: [BufferGeometry, number][] = [];
   const housed: Vector3[] = [];
   for (const { mesh, matrix } of pieces) {
@@ -47,7 +50,7 @@ export function dressed(pieces: readonly { mesh: Mesh; matrix: Matrix4 }[], axes
     }
     const middle = new Vector3().setFromMatrixPosition(matrix);
     const radius = (mesh.geometry as SphereGeometry).parameters.radius * matrix.getMaxScaleOnAxis();
-    const axis = axes.find(({ through, along }) => off(middle, through, along) < NEAR);
+    const axis = axes.find(({ through, along }) => distanceToLine(middle, through, along) < NEAR);
     if (!axis) parts.push([ball(radius).translate(middle.x, middle.y, middle.z), BODY]);
     else if (!housed.some((other) => other.distanceTo(middle) < radius)) {
       housed.push(middle);
@@ -68,7 +71,7 @@ export function dressed(pieces: readonly { mesh: Mesh; matrix: Matrix4 }[], axes
 }
 
 /** Return the distance of a point from a line. */
-function off(point: Vector3, through: Vector3, along: Vector3): number {
+function distanceToLine(point: Vector3, through: Vector3, along: Vector3): number {
   const to = new Vector3().subVectors(point, through);
   return to.addScaledVector(along, -to.dot(along)).length();
 }

@@ -30,7 +30,7 @@ import { type JointLimit, RobotThing } from "./things/robot";
 
 export type { Quality };
 
-export interface EngineOptions {
+interface EngineOptions {
   canvas: HTMLCanvasElement;
   labels: HTMLElement;
   telemetry: Telemetry;
@@ -78,7 +78,7 @@ export class Engine {
   /** Lines from points to their parents. */
   readonly parentLines: ParentLines;
   private readonly pathLine: LazyPath;
-  private readonly ends: (() => void)[] = [];
+  private readonly cleanups: (() => void)[] = [];
 
   constructor(private readonly options: EngineOptions) {
     const { canvas, low } = options;
@@ -125,16 +125,16 @@ export class Engine {
       size: () => ({ width: this.width, height: this.height }),
       draw: () => this.draw(),
     });
-    this.ends.push(light(this.scene));
+    this.cleanups.push(light(this.scene));
     this.floorGrid = new Floor(this.scene, quality === "high");
     this.setDark(options.dark);
-    this.floorGrid.number(() => this.draw()).catch(() => {});
-    this.ends.push(options.telemetry.subscribe((id) => this.reported(id)));
-    this.ends.push(checkAges(this.things, () => this.invalidate()));
+    this.floorGrid.addNumbers(() => this.draw()).catch(() => {});
+    this.cleanups.push(options.telemetry.subscribe((id) => this.reported(id)));
+    this.cleanups.push(checkAges(this.things, () => this.invalidate()));
     const watch = new ResizeObserver(() => this.resize());
     watch.observe(canvas.parentElement ?? canvas);
-    this.ends.push(() => watch.disconnect());
-    this.ends.push(
+    this.cleanups.push(() => watch.disconnect());
+    this.cleanups.push(
       followPointer(canvas, {
         onTap: (x, y, slack) => this.onTap(this.pick(x, y, slack), this.floor(x, y)),
         onHover: (x, y) => this.hover(this.pick(x, y, 4)[0]?.id ?? ""),
@@ -169,7 +169,7 @@ export class Engine {
       changed = true;
     }
     if (!changed) return;
-    for (const thing of this.things.values()) this.hang(thing);
+    for (const thing of this.things.values()) this.attachToParent(thing);
     this.invalidate();
   }
 
@@ -222,9 +222,9 @@ export class Engine {
   }
 
   /** Call a function after each frame; return a function that unsubscribes it. */
-  watch(by: () => void): () => void {
-    this.watchers.add(by);
-    return () => this.watchers.delete(by);
+  watch(watcher: () => void): () => void {
+    this.watchers.add(watcher);
+    return () => this.watchers.delete(watcher);
   }
 
   /** Set the function that selects the labels and reserves places. A frame is drawn only if the scene changed. */
@@ -283,7 +283,7 @@ export class Engine {
   }
 
   dispose(): void {
-    for (const end of this.ends) end();
+    for (const cleanUp of this.cleanups) cleanUp();
     this.requests.dispose();
     this.resolution.dispose();
     for (const [id, thing] of [...this.things]) this.remove(id, thing);
@@ -301,14 +301,14 @@ export class Engine {
   private remove(id: string, thing: Thing): void {
     if (thing instanceof RobotThing) this.movedRobots.delete(thing);
     this.animation.remove(thing);
-    // Children get another frame by `hang`, or are removed themselves.
+    // Children get another frame by `attachToParent`, or are removed themselves.
     for (const other of this.things.values()) if (other.root.parent === thing.root) other.root.removeFromParent();
     thing.dispose();
     this.things.delete(id);
   }
 
   /** Put an item into the frame of its parent. */
-  private hang(thing: Thing): void {
+  private attachToParent(thing: Thing): void {
     const { parent } = thing.item as { parent?: string };
     const frame = (parent !== undefined && this.things.get(parent)?.root) || this.scene;
     if (thing.root.parent !== frame) frame.add(thing.root);
@@ -389,7 +389,7 @@ export class Engine {
     if (!this.resolution.moving) for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
     this.place();
     this.gizmo.place();
-    this.drop.tell(this.things.values(), this.palette, this.labelling.notes);
+    this.drop.update(this.things.values(), this.palette, this.labelling.notes);
     this.labelling.place(this.things, camera, this.width, this.height);
     this.output(this.scene, camera);
     this.frames++;

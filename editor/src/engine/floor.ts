@@ -87,7 +87,7 @@ export class Floor {
   }
 
   /** Add the numbers, which the first picture does not need; `draw` requests a frame. */
-  async number(draw: () => void): Promise<void> {
+  async addNumbers(draw: () => void): Promise<void> {
     const { Scale } = await persistently(() => import("./floorScale"));
     this.scale = new Scale(AXIS, STEP);
     this.root.add(this.scale.mesh);
@@ -106,8 +106,8 @@ export class Floor {
 
 type Lines = [number[], number[]];
 
-function segment([places, colours]: Lines, colour: Color, x: number, y: number, X: number, Y: number): void {
-  places.push(x, y, 0, X, Y, 0);
+function segment([places, colours]: Lines, colour: Color, x1: number, y1: number, x2: number, y2: number): void {
+  places.push(x1, y1, 0, x2, y2, 0);
   colours.push(...colour.toArray(), ...colour.toArray());
 }
 

@@ -25,7 +25,7 @@ const AROUND = 0.12;
 const PART = 0.75;
 
 /** Part of the workplace in a view: its middle, and half of its height, m. */
-export interface Region {
+interface Region {
   middle: Vector3;
   half: number;
 }

@@ -4,7 +4,7 @@ import type { PerspectiveCamera } from "three";
 import { Vector3 } from "three";
 
 /** Largest number of labels. */
-export const MAX_LABELS = 8;
+const MAX_LABELS = 8;
 /** Largest number of candidates; in crowded views most do not fit. */
 const MAX_TRIED = 24;
 /** Distance between two labels, pixels. */

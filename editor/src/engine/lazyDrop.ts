@@ -21,17 +21,17 @@ export class LazyDrop {
   ) {}
 
   /** Show the line below the selected item, and write its height to the notes by item. */
-  tell(things: Iterable<Thing>, palette: Palette, notes: Map<string, string>): void {
+  update(things: Iterable<Thing>, palette: Palette, notes: Map<string, string>): void {
     notes.clear();
     let chosen: Thing | undefined;
     for (const each of things) if (each.item.selected && each.item.kind !== "logic") chosen ??= each;
     const shown = chosen && chosen.item.faint < 1;
     if (shown) chosen?.root.getWorldPosition(this.at);
     const height = shown ? this.at.z : 0;
-    if (chosen) notes.set(chosen.item.id, heightWords(height));
-    const high = Math.abs(height) > LOW;
-    if (this.line) this.line.show(high ? this.at : null, palette);
-    else if (high && !this.loading) void this.load();
+    if (chosen) notes.set(chosen.item.id, heightText(height));
+    const raised = Math.abs(height) > LOW;
+    if (this.line) this.line.show(raised ? this.at : null, palette);
+    else if (raised && !this.loading) void this.load();
   }
 
   dispose(): void {
@@ -48,7 +48,7 @@ export class LazyDrop {
 }
 
 /** Return a height as text, mm. */
-function heightWords(z: number): string {
+function heightText(z: number): string {
   if (Math.abs(z) <= LOW) return "";
   const height = Math.round(Math.abs(z) * 1000);
   return z > 0 ? t`${height} mm above the floor` : t`${height} mm below the floor`;

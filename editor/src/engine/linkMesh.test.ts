@@ -4,7 +4,7 @@ import { type Line, LinkMesh } from "./linkMesh";
 
 const line = (color: string, ...at: number[]): Line => {
   const x = new Vector3(1, 0, 0);
-  const strip = { places: at.map((each) => new Vector3(each)), ways: at.map(() => x) };
+  const strip = { places: at.map((each) => new Vector3(each)), directions: at.map(() => x) };
   return { color, arrow: { strips: [strip], head: [new Vector3(), x] } };
 };
 

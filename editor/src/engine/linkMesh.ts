@@ -36,10 +36,10 @@ void main() {
   vec4 there = projectionMatrix * modelViewMatrix * vec4( position + 0.01 * along, 1.0 );
   gl_Position = projectionMatrix * mvPosition;
   vec2 wide = vec2( projectionMatrix[1][1] / projectionMatrix[0][0], 1.0 );
-  vec2 way = ( there.xy * gl_Position.w - gl_Position.xy * there.w ) * wide;
-  way /= max( length( way ), 1e-9 );
+  vec2 direction = ( there.xy * gl_Position.w - gl_Position.xy * there.w ) * wide;
+  direction /= max( length( direction ), 1e-9 );
   float across = max( ${HALF.toFixed(1)} * pixel * gl_Position.w, ${THINNEST} * projectionMatrix[1][1] );
-  gl_Position.xy += across * ( offset.x * vec2( - way.y, way.x ) + offset.y * way ) / wide;
+  gl_Position.xy += across * ( offset.x * vec2( - direction.y, direction.x ) + offset.y * direction ) / wide;
   vColor = color;
   #include <fog_vertex>
 }`;
@@ -54,7 +54,7 @@ void main() {
 /** Points of a line with its directions there; each piece of a dashed line is one. */
 export interface Strip {
   places: readonly Vector3[];
-  ways: readonly Vector3[];
+  directions: readonly Vector3[];
 }
 
 export interface Arrow {
@@ -96,15 +96,15 @@ export class LinkMesh {
   /** Draw these lines and no others. */
   show(lines: readonly Line[]): void {
     const places: number[] = [];
-    const ways: number[] = [];
+    const directions: number[] = [];
     const offsets: number[] = [];
     const colors: number[] = [];
     const index: number[] = [];
     for (const { arrow, color } of lines) {
       const { r, g, b } = new Color(`#${color}`).getRGB({ r: 0, g: 0, b: 0 }, SRGBColorSpace);
-      const corner = (place: Vector3, way: Vector3, across: number, ahead: number) => {
+      const corner = (place: Vector3, direction: Vector3, across: number, ahead: number) => {
         places.push(place.x, place.y, place.z);
-        ways.push(way.x, way.y, way.z);
+        directions.push(direction.x, direction.y, direction.z);
         offsets.push(across, ahead);
         colors.push(r, g, b);
       };
@@ -112,9 +112,9 @@ export class LinkMesh {
         strip.places.forEach((place, n) => {
           const first = offsets.length / 2;
           if (n > 0) index.push(first - 2, first - 1, first, first, first - 1, first + 1);
-          const way = strip.ways[n] as Vector3;
-          corner(place, way, -1, 0);
-          corner(place, way, 1, 0);
+          const direction = strip.directions[n] as Vector3;
+          corner(place, direction, -1, 0);
+          corner(place, direction, 1, 0);
         });
       const first = offsets.length / 2;
       index.push(first, first + 1, first + 2);
@@ -126,7 +126,7 @@ export class LinkMesh {
     this.mesh.geometry = new BufferGeometry().setIndex(index);
     for (const [name, values, size] of [
       ["position", places, 3],
-      ["along", ways, 3],
+      ["along", directions, 3],
       ["offset", offsets, 2],
       ["color", colors, 3],
     ] as const)

@@ -19,7 +19,7 @@ export class ParentLines {
     new BufferGeometry(),
     new LineBasicMaterial({ transparent: true, opacity: 0.75 }),
   );
-  private room = 0;
+  private capacity = 0;
   /** Number of lines. */
   count = 0;
 
@@ -40,10 +40,10 @@ export class ParentLines {
     this.lines.visible = ends.length > 0;
     if (ends.length === 0) return;
     this.lines.material.color.copy(palette.point);
-    if (ends.length > this.room) {
-      this.room = ends.length * 2;
+    if (ends.length > this.capacity) {
+      this.capacity = ends.length * 2;
       this.lines.geometry.dispose();
-      const places = new BufferAttribute(new Float32Array(this.room * 3), 3);
+      const places = new BufferAttribute(new Float32Array(this.capacity * 3), 3);
       places.setUsage(DynamicDrawUsage);
       this.lines.geometry = new BufferGeometry().setAttribute("position", places);
     }

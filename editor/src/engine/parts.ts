@@ -65,8 +65,8 @@ export class Parts {
     for (const glider of [...this.gliders]) {
       const { mesh, to } = glider;
       const left = to.position.x - mesh.position.x;
-      const way = Math.min(Math.abs(this.velocity) * seconds, Math.abs(left));
-      if (way > 0) mesh.position.x += Math.sign(left) * way;
+      const distance = Math.min(Math.abs(this.velocity) * seconds, Math.abs(left));
+      if (distance > 0) mesh.position.x += Math.sign(left) * distance;
       else if (this.velocity !== 0 || !glider.moved) glider.waits += seconds;
       if (seconds < Infinity && glider.waits < (glider.moved ? LATE : STARTS_WITHIN)) continue;
       this.gliders.splice(this.gliders.indexOf(glider), 1);
@@ -89,7 +89,7 @@ export class Parts {
     if (!this.meshes.has(place.sensor)) this.meshes.set(place.sensor, this.mesh(place));
   }
 
-  /** A part has left a sensor: it is on its way to the next one, if there is one and no part is there. */
+  /** A part has left a sensor: it is on its distance to the next one, if there is one and no part is there. */
   private left(place: DetectedPart): void {
     const ahead = ({ position }: DetectedPart) => (position.x - place.position.x) * this.direction;
     const next = this.places.filter((each) => ahead(each) > 0).sort((a, b) => ahead(a) - ahead(b))[0];

@@ -43,7 +43,7 @@ export function pick(
   small: (id: string) => boolean,
 ): Hit[] {
   const found = new Map<string, Hit & { score: number }>();
-  const look = (dx: number, dy: number, penalty: number, onlySmall: boolean) => {
+  const cast = (dx: number, dy: number, penalty: number, onlySmall: boolean) => {
     place.set(((x + dx) / size.width) * 2 - 1, 1 - ((y + dy) / size.height) * 2);
     caster.setFromCamera(place, camera);
     for (const each of caster.intersectObjects(roots, true)) {
@@ -58,8 +58,8 @@ export function pick(
       found.set(id, { id, point: each.point.clone(), normal, distance: each.distance, score });
     }
   };
-  look(0, 0, 0, false);
-  if (slack > 0) for (const [dx, dy] of AROUND) look(dx * slack, dy * slack, 0.03, true);
+  cast(0, 0, 0, false);
+  if (slack > 0) for (const [dx, dy] of AROUND) cast(dx * slack, dy * slack, 0.03, true);
   return [...found.values()].sort((a, b) => a.score - b.score).map(({ score: _, ...hit }) => hit);
 }
 

@@ -5,7 +5,7 @@ const TAP = { distance: 8, time: 600 };
 /** Distance from the pointer within which small items are hit, pixels. */
 const SLACK = { mouse: 6, touch: 16 };
 
-export interface PointerHandlers {
+interface PointerHandlers {
   /** Called with the position in the view and the slack, pixels. */
   onTap: (x: number, y: number, slack: number) => void;
   onHover: (x: number, y: number) => void;

@@ -122,7 +122,7 @@ export function trianglesOf(root: Object3D, id: string): number {
 }
 
 /** Make a material transparent or opaque, which changes its shader. */
-export function seenThrough(material: Material, on: boolean): void {
+export function setTransparent(material: Material, on: boolean): void {
   if (material.transparent === on) return;
   material.transparent = on;
   material.needsUpdate = true;

@@ -66,8 +66,8 @@ function Causes({ causes }: { causes: readonly FleetCause[] }) {
     { name: t`Alarm` },
     { name: t`Cell` },
     { name: t`Device` },
-    { name: t`How often`, number: true },
-    { name: t`How long`, number: true },
+    { name: t`Count`, number: true },
+    { name: t`Total duration`, number: true },
   ];
   const rows = causes.map((each) => ({
     key: JSON.stringify([each.cell, each.newest.record.kind, each.newest.record.code, each.newest.record.object_id]),
@@ -92,7 +92,7 @@ function Alarms({ alarms }: { alarms: readonly FleetAlarm[] }) {
     { name: t`Device` },
     { name: t`Alarm` },
     { name: t`Priority` },
-    { name: t`How long`, number: true },
+    { name: t`Duration`, number: true },
   ];
   const rows = alarms.map(({ id, at, cell, duration, alarm }) => ({
     key: id,

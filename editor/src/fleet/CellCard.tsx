@@ -68,7 +68,12 @@ function Remove({ id, name }: { id: string; name: string }) {
     );
   return (
     <>
-      <Button look="plain" icon="close" aria-label={t`Remove ${name} from this page`} onPress={() => void remove()} />
+      <Button
+        variant="plain"
+        icon="close"
+        aria-label={t`Remove ${name} from this page`}
+        onPress={() => void remove()}
+      />
       {refused && <p role="alert">{refused}</p>}
     </>
   );

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useId } from "react";
-import { OneOf, Pick } from "../ui/kit/fields";
+import { SelectField, ToggleGroup } from "../ui/kit/fields";
 import { type Choice, dayOf, type Span } from "./results";
 
 interface FiltersProps {
@@ -21,7 +21,12 @@ export function Filters({ choice, cells, onChange }: FiltersProps) {
   ];
   return (
     <div className="fleet-filters">
-      <OneOf label={t`Period`} value={choice.span} choices={spans} onChange={(span) => onChange({ ...choice, span })} />
+      <ToggleGroup
+        label={t`Period`}
+        value={choice.span}
+        choices={spans}
+        onChange={(span) => onChange({ ...choice, span })}
+      />
       {choice.span === "day" && (
         <div className="field">
           <label htmlFor={id}>{t`Day`}</label>
@@ -34,7 +39,7 @@ export function Filters({ choice, cells, onChange }: FiltersProps) {
           />
         </div>
       )}
-      <Pick
+      <SelectField
         label={t`Cell`}
         value={choice.cell}
         choices={[["", t`All cells`] as const, ...cells.map((name) => [name, name] as const)]}

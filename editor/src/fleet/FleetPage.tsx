@@ -6,7 +6,7 @@
 import { i18n } from "@lingui/core";
 import { msg, plural, t } from "@lingui/core/macro";
 import { Suspense, useMemo, useState, useSyncExternalStore } from "react";
-import { compared } from "../formats";
+import { compareTexts } from "../formats";
 import { isLanguage, LANGUAGES, loadCatalogue, useLanguage } from "../i18n/catalogue";
 import { remember } from "../session/localStorage";
 import { Icon } from "../ui/kit/icons";
@@ -43,7 +43,7 @@ export function FleetPage({ feed }: { feed: FleetFeed }) {
   const tab = useTab();
   const { cards, connected, broker, loaded, needsToken } = useSyncExternalStore(feed.subscribe, feed.present);
   const [choice, setChoice] = useState<Choice>(() => ({ span: "8", day: dayOf(Date.now()), cell: "" }));
-  const names = useMemo(() => [...new Set([...cards.values()].map((card) => card.name))].sort(compared), [cards]);
+  const names = useMemo(() => [...new Set([...cards.values()].map((card) => card.name))].sort(compareTexts), [cards]);
   if (needsToken) return <Token key={language} onToken={(token) => (remember("token", token), feed.connect(token))} />;
   const view = { choice, cells: names, onChange: setChoice };
   return (
@@ -162,7 +162,7 @@ function Token({ onToken }: { onToken: (token: string) => void }) {
         {t`Token`}
         <input type="password" autoComplete="off" value={token} onChange={(event) => setToken(event.target.value)} />
       </label>
-      <Button look="primary" type="submit">{t`Show the cells`}</Button>
+      <Button variant="primary" type="submit">{t`Show the cells`}</Button>
     </form>
   );
 }

@@ -15,7 +15,7 @@ const HOUR = 3600;
 const DAY = 24 * HOUR;
 
 /** Return the bars: their start times, all units, and the good ones, which are drawn over them. */
-export function barsOf({ since, until, step, times }: FleetProduction): [number[], number[], number[]] {
+function barsOf({ since, until, step, times }: FleetProduction): [number[], number[], number[]] {
   const known = new Map(times.map((each) => [each.at, each]));
   const [starts, all, good]: [number[], number[], number[]] = [[], [], []];
   for (let at = since; at < until; at += step) {

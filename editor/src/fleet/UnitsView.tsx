@@ -7,8 +7,8 @@ import { Input, Label, SearchField } from "react-aria-components";
 import { dateAndTime, decimal } from "../formats";
 import { translate } from "../i18n/serverMessages";
 import type { FleetProduction, FleetUnit } from "../protocol/types";
-import { Window } from "../ui/kit/dialogs";
-import { OnOff } from "../ui/kit/fields";
+import { ModalDialog } from "../ui/kit/dialogs";
+import { SwitchField } from "../ui/kit/fields";
 import { Button, Waiting } from "../ui/kit/kit";
 import { RefusedText } from "../ui/points/Refusal";
 import { nameOf, UnitDetails } from "../ui/production/UnitDetails";
@@ -130,9 +130,9 @@ function ByCell({ production, single }: { production: FleetProduction; single: b
     <section className="fleet-list">
       <h2>{t`Units by cell`}</h2>
       {!single && (
-        <OnOff isSelected={wanted} onChange={setWanted}>
+        <SwitchField isSelected={wanted} onChange={setWanted}>
           {t`By product and program`}
-        </OnOff>
+        </SwitchField>
       )}
       <div className="fleet-scroll" tabIndex={0} role="group" aria-label={t`Units by cell`}>
         <Table title={t`Units by cell`} columns={columns} rows={rows} narrow />
@@ -165,7 +165,7 @@ function Units({ choice }: { choice: Choice }) {
   const row = (each: FleetUnit) => ({
     key: each.id,
     cells: [
-      <Button key="open" look="plain" onPress={() => setOpened(each)}>
+      <Button key="open" variant="plain" onPress={() => setOpened(each)}>
         <strong data-name>{nameOf(each.unit)}</strong>
       </Button>,
       <span key="cell" data-name>
@@ -210,13 +210,13 @@ export function reasonOf({ unit }: Pick<FleetUnit, "unit">): string {
 function OpenedUnit({ unit, onClose }: { unit: FleetUnit; onClose: () => void }) {
   const { data, failed } = useLoaded(String(unit.id), () => loadUnit(unit.id));
   return (
-    <Window title={`${nameOf(unit.unit)} · ${unit.cell}`} onClose={onClose}>
+    <ModalDialog title={`${nameOf(unit.unit)} · ${unit.cell}`} onClose={onClose}>
       {!data && !failed && <Waiting>{t`Loading…`}</Waiting>}
       <RefusedText>{failed}</RefusedText>
       {data && <UnitDetails unit={data} translations={unit.unit.translations} />}
       <div className="actions">
-        <Button look="primary" onPress={onClose}>{t`Close`}</Button>
+        <Button variant="primary" onPress={onClose}>{t`Close`}</Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }

@@ -2,7 +2,7 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import { clock, compared } from "../formats";
+import { clock, compareTexts } from "../formats";
 import { translate } from "../i18n/serverMessages";
 import { splitAddress } from "../program/messages";
 import type { FleetCard, FleetState } from "../protocol/types";
@@ -10,7 +10,7 @@ import { STATES } from "../ui/cell/words";
 import type { IconName } from "../ui/kit/icons";
 
 /** How urgently a cell needs attention, most urgently first. */
-export const LEVELS = ["need", "watch", "running", "ready", "gone"] as const;
+const LEVELS = ["need", "watch", "running", "ready", "gone"] as const;
 export type Level = (typeof LEVELS)[number];
 
 export const TITLES: Record<Level, MessageDescriptor> = {
@@ -73,7 +73,7 @@ export function controlOf({ authority, started_by, controlling }: FleetState): s
 
 /** Return the cards by level, sorted by name; levels without cards are left out. */
 export function groups(cards: Iterable<FleetCard>): [Level, FleetCard[]][] {
-  const sorted = [...cards].sort((one, other) => compared(one.name, other.name) || compared(one.id, other.id));
+  const sorted = [...cards].sort((one, other) => compareTexts(one.name, other.name) || compareTexts(one.id, other.id));
   const found = LEVELS.map((level): [Level, FleetCard[]] => [level, sorted.filter((card) => levelOf(card) === level)]);
   return found.filter(([, members]) => members.length > 0);
 }

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { saveAs } from "../commands/files";
-import { compared } from "../formats";
+import { compareTexts } from "../formats";
 import type { FleetAlarm, FleetCause, FleetCount, FleetProduction, FleetUnit, UnitRecord } from "../protocol/types";
 import { FILE_DEADLINE, rest } from "../session/rest";
 
@@ -63,17 +63,17 @@ export const loadAlarms = (query: Query, last?: FleetAlarm) =>
 export const loadUnit = (id: number) => load<UnitRecord>(`units/${id}`, {});
 
 /** Save units or alarms as CSV on this device. Reject with a sentence. */
-export async function exportResults(what: "units" | "alarms", query: Query): Promise<void> {
+export async function exportResults(file: "units" | "alarms", query: Query): Promise<void> {
   const words = new URLSearchParams(Object.entries(query).map(([key, value]) => [key, String(value)]));
   const failure = t`The records are not available`;
-  const response = await rest(`/api/fleet/${what}/export?${words}`, { failure, deadline: FILE_DEADLINE });
-  saveAs(await response.blob(), `${what}-${new Date().toISOString().slice(0, 10)}.csv`);
+  const response = await rest(`/api/fleet/${file}/export?${words}`, { failure, deadline: FILE_DEADLINE });
+  saveAs(await response.blob(), `${file}-${new Date().toISOString().slice(0, 10)}.csv`);
 }
 
 export type Counts = Pick<FleetCount, "good" | "bad" | "rejected">;
 
 /** Units of a cell, and of each of its products and programs if there are several. */
-export interface CellCounts extends Counts {
+interface CellCounts extends Counts {
   cell: string;
   parts: FleetCount[];
 }
@@ -109,7 +109,7 @@ export function byCell(counts: readonly FleetCount[]): CellCounts[] {
     .map(([cell, parts]) => ({
       cell,
       ...sumOf(parts),
-      parts: parts.sort((one, other) => compared(named(one), named(other))),
+      parts: parts.sort((one, other) => compareTexts(named(one), named(other))),
     }))
-    .sort((one, other) => compared(one.cell, other.cell));
+    .sort((one, other) => compareTexts(one.cell, other.cell));
 }

@@ -4,7 +4,7 @@ import type { Lists } from "../store/state";
 import type { RecentIds } from "./opened";
 
 /** Continue with a document, start with the newest one of other users, or create the first one. */
-export type Proposal =
+type Proposal =
   | { kind: "continue" | "start"; document: "scene" | "project"; id: string; name: string }
   | { kind: "empty" };
 

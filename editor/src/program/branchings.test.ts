@@ -1,7 +1,7 @@
 /** The branches that a program can take, for a dry run. */
 
 import { expect, test } from "vitest";
-import { branchings, existing } from "./branchings";
+import { branchings, existingChoices } from "./branchings";
 import { program, TYPES } from "./testing";
 
 test("branching actions state their branches; a removed branch is not chosen any more", () => {
@@ -22,6 +22,6 @@ test("branching actions state their branches; a removed branch is not chosen any
       ],
     },
   ]);
-  expect(existing(found, { a: "END", b: "c" })).toEqual({ a: "END" });
-  expect(existing(found, { a: "c" })).toEqual({});
+  expect(existingChoices(found, { a: "END", b: "c" })).toEqual({ a: "END" });
+  expect(existingChoices(found, { a: "c" })).toEqual({});
 });

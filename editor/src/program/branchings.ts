@@ -5,7 +5,7 @@ import type { OpenDocument, State } from "../store/state";
 import { conditionWords } from "./logic";
 import { nextSteps, placeOf } from "./steps";
 
-export interface Branching {
+interface Branching {
   id: string;
   name: string;
   /** The next action or END, and the condition in words. */
@@ -32,7 +32,7 @@ export function branchings(doc: OpenDocument, types: State["types"]): Branching[
 }
 
 /** Return the chosen branches that still exist. */
-export function existing(
+export function existingChoices(
   found: readonly Branching[],
   chosen: Readonly<Record<string, string>>,
 ): Record<string, string> {

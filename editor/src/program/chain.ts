@@ -81,7 +81,7 @@ function lastOf(doc: OpenDocument): string {
 }
 
 /** The way in which an action is inserted into a slot. */
-export interface Insertion {
+interface Insertion {
   /** Connection that leads to the new action from now on. */
   redirect?: string;
   /** Connection that becomes the other branch. */

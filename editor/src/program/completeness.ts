@@ -18,7 +18,7 @@ type Values = Record<string, Value>;
 const MAX_CASES = 2000;
 
 /** The coverage of all values by conditions that are tested in order. */
-export interface Cases {
+interface Cases {
   /** Indexes of the conditions that never apply. */
   unused: number[];
   /** Values for which no condition is true. */
@@ -136,7 +136,7 @@ function valuesWords(doc: OpenDocument, types: State["types"], values: Values): 
 }
 
 /** The problem of the conditions of the connections from an action. */
-export interface BranchProblem {
+interface BranchProblem {
   /** Id of the action, or of the connection. */
   id: string;
   text: string;

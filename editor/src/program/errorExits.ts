@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { Action } from "../protocol/types";
-import type { Of, OpenDocument } from "../store/state";
+import type { OnPoint, OpenDocument } from "../store/state";
 import { ANY, KIND_NAMES } from "./errorKinds";
 import { after, before, errorExits, incoming, outgoing, placeOf, START } from "./logic";
 
@@ -10,8 +10,8 @@ import { after, before, errorExits, incoming, outgoing, placeOf, START } from ".
 const PARTS = 3;
 
 /** A part of the error of an action: the name of the device, the kind, or the text for the operator. */
-export interface ErrorPart {
-  action: Of<Action>;
+interface ErrorPart {
+  action: OnPoint<Action>;
   index: number;
   name: string;
 }

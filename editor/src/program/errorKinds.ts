@@ -9,7 +9,7 @@ export const ANY = "error";
 /** Names of the kinds. Any error comes last, as its exit is followed only if no other one is. */
 export const KIND_NAMES: Readonly<Record<string, MessageDescriptor>> = {
   refused: msg`Refused`,
-  device_timeout: msg`Not done in time`,
+  device_timeout: msg`Timeout`,
   device_fault: msg`Device fault`,
   out_of_range: msg`Out of range`,
   stale: msg`Value too old`,

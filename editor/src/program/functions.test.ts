@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { ProjectFunction, ServerEvent } from "../protocol/types";
-import { changed } from "../store/document";
+import { documentAfter } from "../store/document";
 import { anyAction, functionOf, inScope, pathTo, scopeOf } from "../store/scope";
 import { initialState, type OpenDocument, type State } from "../store/state";
 import {
@@ -81,11 +81,11 @@ describe("the open function", () => {
 
   it("follows the changes of others, and closes when the function is removed", () => {
     const open = inScope(withFunction(), ["pfu"]);
-    const renamed = changed(open, event("update", { ...HANDLE, name: "treat" }));
+    const renamed = documentAfter(open, event("update", { ...HANDLE, name: "treat" }));
     expect(renamed.functions.pfu?.name).toBe("treat");
     expect(Object.keys(renamed.actions)).toEqual(["feed", "look"]);
     const elsewhere = { ...(open.program.actions.a as OpenDocument["actions"][string]), name: "other" };
-    const moved = changed(open, {
+    const moved = documentAfter(open, {
       event: "ActionChanged",
       change_type: "update",
       parent_id: "point",
@@ -93,14 +93,14 @@ describe("the open function", () => {
     } as ServerEvent);
     expect(Object.keys(moved.actions)).toEqual(["feed", "look"]);
     expect(moved.program.actions.a?.name).toBe("other");
-    const closed = changed(open, event("remove", HANDLE));
+    const closed = documentAfter(open, event("remove", HANDLE));
     expect(closed.path).toEqual([]);
     expect(Object.keys(closed.actions)).toEqual(["a", "call", "z"]);
   });
 
   it("keeps its actions while nothing about them changes", () => {
     const open = inScope(withFunction(), ["pfu"]);
-    const later = changed(open, { event: "ProjectSaved" } as ServerEvent);
+    const later = documentAfter(open, { event: "ProjectSaved" } as ServerEvent);
     expect(later.actions.feed).toBe(open.actions.feed);
   });
 

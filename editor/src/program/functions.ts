@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import type { Action } from "../protocol/types";
 import { inScope, pointUsed, scopeOf } from "../store/scope";
-import type { Of, OpenDocument, OpenFunction } from "../store/state";
+import type { OnPoint, OpenDocument, OpenFunction } from "../store/state";
 import { decoded } from "./decoded";
 import { ordered } from "./listing";
 import { after, before, calledBy, END, outgoing, PASSED_ON, placeOf, START } from "./logic";
@@ -11,7 +11,7 @@ import { freeName } from "./naming";
 import { callsIn, isParallel } from "./parallel";
 
 /** Return the device and the point of an action as text, the function that it calls, or the calls that it runs. */
-export function detailOf(doc: OpenDocument, action: Of<Action>): string {
+export function detailOf(doc: OpenDocument, action: OnPoint<Action>): string {
   if (isParallel(action))
     return t`in parallel: ${callsIn(doc, action)
       .map((each) => each.name)
@@ -26,7 +26,7 @@ export function detailOf(doc: OpenDocument, action: Of<Action>): string {
 }
 
 /** Return all calls of a function, and the functions in which they are; an empty name stands for the program. */
-export function callsOf(doc: OpenDocument, id: string): { action: Of<Action>; within: string }[] {
+export function callsOf(doc: OpenDocument, id: string): { action: OnPoint<Action>; within: string }[] {
   return [{ ...doc.program, name: "" }, ...Object.values(doc.functions)].flatMap(({ actions, name }) =>
     Object.values(actions)
       .filter((each) => calledBy(doc, each)?.id === id)
@@ -76,7 +76,7 @@ export function suggestedName(doc: OpenDocument, ids: readonly string[]): string
 export const functionNames = (doc: OpenDocument): string[] => Object.values(doc.functions).map((each) => each.name);
 
 /** Return the actions of a function that use one of its parameters. */
-export const usersOfParameter = ({ actions }: OpenFunction, name: string): Of<Action>[] =>
+export const usersOfParameter = ({ actions }: OpenFunction, name: string): OnPoint<Action>[] =>
   Object.values(actions).filter((action) =>
     action.parameters.some((each) => each.type === PASSED_ON && decoded(each.value) === name),
   );
@@ -96,7 +96,7 @@ export function onAllPaths(doc: OpenDocument, id: string): boolean {
 }
 
 /** A stored result of an action that a function can return. */
-export interface ResultOffer {
+interface ResultOffer {
   link: string;
   name: string;
   action: string;

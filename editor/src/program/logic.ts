@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { Action, LogicItem, ProjectLogicIf } from "../protocol/types";
-import type { Of, OpenDocument, State } from "../store/state";
+import type { OnPoint, OpenDocument, State } from "../store/state";
 import { errorWords } from "./errorKinds";
 import { linkTo, type Result, resultAt, resultsOf, whenOf, whenWords } from "./operands";
 import { runnerOf } from "./parallel";
@@ -71,7 +71,7 @@ export function canHaveFailed(doc: OpenDocument, action: string, at: string): bo
  * Return the actions whose results a connection from an action can depend on: itself first, then the calls that it runs
  * and earlier ones.
  */
-export function conditionActions(doc: OpenDocument, id: string): Of<Action>[] {
+export function conditionActions(doc: OpenDocument, id: string): OnPoint<Action>[] {
   const own = doc.actions[id];
   if (!own) return [];
   const earlier = before(doc, id);
@@ -91,7 +91,7 @@ export function conditionsOf(doc: OpenDocument, types: State["types"], id: strin
 
 // ------------------------------------------------------------------------------------------------ branches
 /** The kind of a new connection from an action that fits the existing connections. */
-export interface NewStep {
+interface NewStep {
   condition?: ProjectLogicIf;
   /** The existing connection, which needs a condition first. */
   first?: { item: LogicItem; condition: ProjectLogicIf };

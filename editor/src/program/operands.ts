@@ -16,7 +16,7 @@ import type {
   ProjectParameter,
 } from "../protocol/types";
 import { perObject } from "../store/memo";
-import type { Of, OpenDocument, OpenFunction, State } from "../store/state";
+import type { OnPoint, OpenDocument, OpenFunction, State } from "../store/state";
 import { decoded } from "./decoded";
 
 /** Return the description of an action by its type; undefined if unknown. */
@@ -80,7 +80,7 @@ function firstUse(
 }
 
 export interface Result {
-  action: Of<Action>;
+  action: OnPoint<Action>;
   index: number;
   name: string;
   type: string;
@@ -91,7 +91,7 @@ export const variableNamed = (doc: OpenDocument, name: string): ProjectParameter
   Object.values(doc.parameters).find((each) => each.variable && each.name === name);
 
 /** Return the results of an action that are stored under their own names, not in variables. */
-export function resultsOf(doc: OpenDocument, types: State["types"], action: Of<Action>): Result[] {
+export function resultsOf(doc: OpenDocument, types: State["types"], action: OnPoint<Action>): Result[] {
   const returns = metaOf(types, doc, action)?.returns ?? [];
   const outputs = action.flows.find((flow) => flow.type === "default")?.outputs ?? [];
   return returns.flatMap((type, index) => {

@@ -2,7 +2,7 @@
 
 import type { Action } from "../protocol/types";
 import { perObject } from "../store/memo";
-import type { Of, OpenDocument } from "../store/state";
+import type { OnPoint, OpenDocument } from "../store/state";
 
 const PARALLEL = "functions/parallel";
 
@@ -20,5 +20,5 @@ export const parallelOf = perObject(
 export const runnerOf = (doc: OpenDocument, id: string): string => parallelOf(doc).get(id) ?? id;
 
 /** Return the calls that a parallel action runs; none for other actions. */
-export const callsIn = (doc: OpenDocument, { branches = [] }: Pick<Action, "branches">): Of<Action>[] =>
+export const callsIn = (doc: OpenDocument, { branches = [] }: Pick<Action, "branches">): OnPoint<Action>[] =>
   branches.flatMap((id) => doc.actions[id] ?? []);

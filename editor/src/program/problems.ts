@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import type { Action } from "../protocol/types";
 import { inScope, scopeOf } from "../store/scope";
-import type { Of, OpenDocument, State } from "../store/state";
+import type { OnPoint, OpenDocument, State } from "../store/state";
 import { branchProblems, canLackResults } from "./completeness";
 import { decoded } from "./decoded";
 import { errorAt, hasFailed, linkToError, partNames } from "./errorExits";
@@ -87,9 +87,9 @@ function problemsIn(doc: OpenDocument, types: State["types"], reach: State["reac
   return found;
 }
 
-type Tell = (id: string, text: string) => void;
+type Report = (id: string, text: string) => void;
 
-function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Tell): void {
+function ofLogic(doc: OpenDocument, types: State["types"], error: Report, warn: Report): void {
   const used = after(doc, START);
   const branches = parallelOf(doc);
   if (outgoing(doc, START).length === 0) error(START, t`Start has no next step. Connect it to the first action.`);
@@ -168,8 +168,8 @@ function ofAction(
   doc: OpenDocument,
   types: State["types"],
   action: OpenDocument["actions"][string],
-  error: Tell,
-  warn: Tell,
+  error: Report,
+  warn: Report,
 ): void {
   const [objectId = ""] = action.type.split("/");
   if (isParallel(action)) {
@@ -229,7 +229,7 @@ function ofAction(
 }
 
 /** Return the problem of a link to an error; an empty string if there is none. */
-function errorProblem(doc: OpenDocument, action: Of<Action>, parameter: string, link: string): string {
+function errorProblem(doc: OpenDocument, action: OnPoint<Action>, parameter: string, link: string): string {
   const part = errorAt(doc, link);
   if (!part) return t`${action.name}: the error used for ${parameter} is not stored.`;
   if (!doc.project?.has_logic || !after(doc, START).has(action.id) || hasFailed(doc, part.action.id, action.id))
@@ -239,7 +239,12 @@ function errorProblem(doc: OpenDocument, action: Of<Action>, parameter: string, 
 }
 
 /** Return the problem of a link to a result of an action that can have failed; undefined if it cannot. */
-function failedProblem(doc: OpenDocument, action: Of<Action>, parameter: string, link: string): string | undefined {
+function failedProblem(
+  doc: OpenDocument,
+  action: OnPoint<Action>,
+  parameter: string,
+  link: string,
+): string | undefined {
   const source = doc.actions[link.split("/")[0] ?? ""];
   if (!source || !canHaveFailed(doc, source.id, action.id)) return undefined;
   return t`${action.name}: ${parameter} uses a result of ${source.name}, which can have failed before it.`;

@@ -8,7 +8,16 @@ import { freeName, newOutputs } from "./naming";
 import { problemsOf, usersOf } from "./problems";
 import { reachOfAction } from "./reach";
 import { program, TYPES } from "./testing";
-import { double, extraOf, initial, nameWithoutUnit, rangeWords, read, textOf, withoutUnit } from "./values";
+import {
+  doubleText,
+  extraOf,
+  initialValue,
+  nameWithoutUnit,
+  parseValue,
+  rangeWords,
+  textOf,
+  withoutUnit,
+} from "./values";
 
 describe("steps", () => {
   test("the first next step is unconditional, a second one makes both conditional", () => {
@@ -149,19 +158,19 @@ describe("problems", () => {
 
 describe("values", () => {
   test("a double keeps its decimal point, limits are checked, and invalid numbers are reported", () => {
-    expect(read("double", "1")).toEqual({ json: "1.0" });
-    expect(read("double", "0,5")).toEqual({ json: "0.5" });
-    expect(double(1e21)).toBe("1e+21");
-    expect(read("integer", "1.5")).toEqual({ problem: "Enter a whole number." });
-    expect(read("integer", "9", { maximum: 8 })).toEqual({ problem: "At most 8." });
-    expect(read("integer", "")).toEqual({ problem: "Enter a number." });
-    expect(read("string", ' "x" ')).toEqual({ json: JSON.stringify(' "x" ') });
+    expect(parseValue("double", "1")).toEqual({ json: "1.0" });
+    expect(parseValue("double", "0,5")).toEqual({ json: "0.5" });
+    expect(doubleText(1e21)).toBe("1e+21");
+    expect(parseValue("integer", "1.5")).toEqual({ problem: "Enter a whole number." });
+    expect(parseValue("integer", "9", { maximum: 8 })).toEqual({ problem: "At most 8." });
+    expect(parseValue("integer", "")).toEqual({ problem: "Enter a number." });
+    expect(parseValue("string", ' "x" ')).toEqual({ json: JSON.stringify(' "x" ') });
     expect(textOf("string", JSON.stringify(' "x" '))).toBe(' "x" ');
     const speed = extraOf({ extra: '{"minimum":0,"maximum":2,"unit":"m/s"}' });
     expect(rangeWords("double", speed)).toBe("0 to 2000 mm/s");
     expect(textOf("double", "0.25", speed)).toBe("250");
-    expect(read("double", "250", speed)).toEqual({ json: "0.25" });
-    expect(read("double", "2001", speed)).toEqual({ problem: "At most 2000." });
+    expect(parseValue("double", "250", speed)).toEqual({ json: "0.25" });
+    expect(parseValue("double", "2001", speed)).toEqual({ problem: "At most 2000." });
     expect(withoutUnit("highest speed, m/s; the arm slows down", "double", speed)).toBe(
       "highest speed; the arm slows down",
     );
@@ -170,21 +179,21 @@ describe("values", () => {
     expect(rangeWords("double", { minimum: 0.01, maximum: 1 })).toBe("1 to 100 %");
     const period = { unit: "ms", minimum: 200, maximum: 1000 };
     expect([textOf("integer", "800", period), rangeWords("integer", period)]).toEqual(["0.8", "0.2 to 1 s"]);
-    expect(read("integer", "0,25", period)).toEqual({ json: "250" });
-    expect(read("integer", "0.2505", period)).toEqual({ problem: "Enter a multiple of 0.001." });
+    expect(parseValue("integer", "0,25", period)).toEqual({ json: "250" });
+    expect(parseValue("integer", "0.2505", period)).toEqual({ problem: "Enter a multiple of 0.001." });
     expect([nameWithoutUnit("heartbeat_ms", period), nameWithoutUnit("items", {})]).toEqual(["heartbeat", "items"]);
     expect(withoutUnit("time until the drive stops, ms; 0: never", "integer", period)).toBe(
       "time until the drive stops; 0: never",
     );
     expect(textOf("double", "1.5707963267948966", { unit: "rad" })).toBe("90");
-    expect(read("double", "90", { unit: "rad" })).toEqual({ json: "1.5707963267949" });
+    expect(parseValue("double", "90", { unit: "rad" })).toEqual({ json: "1.5707963267949" });
     expect(textOf("integer", "2000", { unit: "ms" })).toBe("2");
     expect(extraOf({ extra: "no json" })).toEqual({});
   });
 
   test("the default of a number is the smallest allowed value", () => {
     const of = (type: string, extra?: object) =>
-      initial({ name: "x", type, dynamic_value: false, ...(extra ? { extra: JSON.stringify(extra) } : {}) });
+      initialValue({ name: "x", type, dynamic_value: false, ...(extra ? { extra: JSON.stringify(extra) } : {}) });
     expect([of("integer", { minimum: 3 }), of("double", { maximum: -2 }), of("boolean"), of("string")]).toEqual([
       "3",
       "-2.0",

@@ -4,11 +4,11 @@ import type { Action, Reach, ReachabilityData } from "../protocol/types";
 import { decoded } from "./decoded";
 
 /** Reachabilities from best to worst. */
-export const REACHES: readonly Reach[] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];
+const REACHES: readonly Reach[] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];
 
 export const worse = (a: Reach, b: Reach): boolean => REACHES.indexOf(a) > REACHES.indexOf(b);
 
-export interface ActionReach {
+interface ActionReach {
   reach: Reach;
   /** The reason given by the server; empty if it is reachable. */
   reason: string;
@@ -17,7 +17,7 @@ export interface ActionReach {
 }
 
 /** Return the orientations and joints that are targets of an action. */
-export function goalsOf({ parameters }: Pick<Action, "parameters">): string[] {
+function goalsOf({ parameters }: Pick<Action, "parameters">): string[] {
   return parameters.flatMap(({ type, value }) =>
     type === "pose" || type === "joints" ? [String(decoded(value))] : [],
   );

@@ -4,7 +4,7 @@ import type { OpenDocument } from "../store/state";
 import { branchKind, incoming, outgoing, placeOf } from "./steps";
 
 /** Fewest actions of a sequence that can be folded. */
-export const MIN_FOLDED = 3;
+const MIN_FOLDED = 3;
 
 /** Return sequences of actions without branches in or out; each in its order. */
 export function runsOf(doc: OpenDocument): string[][] {

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import type { Action, ActionParameter, TraceEntry } from "../protocol/types";
 import { anyAction } from "../store/scope";
-import type { Of, OpenDocument, State } from "../store/state";
+import type { OnPoint, OpenDocument, State } from "../store/state";
 import { decoded } from "./decoded";
 import { errorAt } from "./errorExits";
 import { calledBy, metaOf, PASSED_ON } from "./logic";
@@ -90,7 +90,7 @@ function firstSentence(description = ""): string {
 export function valuesOf(
   doc: OpenDocument,
   types: State["types"],
-  action: Of<Action>,
+  action: OnPoint<Action>,
   sent?: readonly string[],
 ): string {
   const parameters = metaOf(types, doc, action)?.parameters ?? [];
@@ -109,7 +109,12 @@ export function valuesOf(
     .join(" · ");
 }
 
-function shortValue(doc: OpenDocument, action: Of<Action>, { type, value }: ActionParameter, extra: Extra): string {
+function shortValue(
+  doc: OpenDocument,
+  action: OnPoint<Action>,
+  { type, value }: ActionParameter,
+  extra: Extra,
+): string {
   const read = decoded(value);
   if (type === "project_parameter") {
     const parameter = doc.parameters[String(read)];

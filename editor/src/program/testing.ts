@@ -1,7 +1,7 @@
 /** Programs for unit tests. */
 
 import type { LogicItem, ObjectAction, Project, Scene } from "../protocol/types";
-import { opened } from "../store/document";
+import { documentFrom } from "../store/document";
 import type { OpenDocument, State } from "../store/state";
 import { initialState } from "../store/state";
 
@@ -72,5 +72,5 @@ export function program(
     logic,
     object_overrides: [],
   };
-  return opened(scene, project);
+  return documentFrom(scene, project);
 }

@@ -102,10 +102,10 @@ export function textOf(type: string, json: string | undefined, extra: Extra = {}
   return type.endsWith("pose") || typeof value === "object" ? JSON.stringify(value) : String(value);
 }
 
-export type Read = { json: string } | { problem: string };
+type ParsedValue = { json: string } | { problem: string };
 
 /** Read the text of a field: JSON for the server, or the problem as a sentence. */
-export function read(type: string, text: string, extra: Extra = {}): Read {
+export function parseValue(type: string, text: string, extra: Extra = {}): ParsedValue {
   const clean = text.trim();
   switch (type) {
     case "string":
@@ -124,7 +124,7 @@ export function read(type: string, text: string, extra: Extra = {}): Read {
   }
 }
 
-function readNumber(type: "integer" | "double", text: string, extra: Extra): Read {
+function readNumber(type: "integer" | "double", text: string, extra: Extra): ParsedValue {
   const { minimum, maximum } = extra;
   const [, factor] = shownUnit(type, extra);
   const value = Number((numberFrom(text) / factor).toPrecision(15));
@@ -133,17 +133,17 @@ function readNumber(type: "integer" | "double", text: string, extra: Extra): Rea
     return { problem: factor === 1 ? t`Enter a whole number.` : t`Enter a multiple of ${decimal(factor)}.` };
   if (minimum !== undefined && value < minimum) return { problem: t`At least ${decimal(exact(minimum * factor))}.` };
   if (maximum !== undefined && value > maximum) return { problem: t`At most ${decimal(exact(maximum * factor))}.` };
-  return { json: type === "double" ? double(value) : String(value) };
+  return { json: type === "double" ? doubleText(value) : String(value) };
 }
 
 /** On the wire a double has a fraction. */
-export function double(value: number): string {
+export function doubleText(value: number): string {
   const text = String(value);
   return /[.e]/.test(text) ? text : `${text}.0`;
 }
 
 /** Return the initial value of a parameter of a simple type; undefined if there is none. */
-export function initial(meta: ParameterMeta): string | undefined {
+export function initialValue(meta: ParameterMeta): string | undefined {
   if (meta.default_value !== undefined) return meta.default_value;
   const { minimum, maximum, allowed_values } = extraOf(meta);
   const least = Math.min(Math.max(0, minimum ?? 0), maximum ?? Infinity);
@@ -153,7 +153,7 @@ export function initial(meta: ParameterMeta): string | undefined {
     case "integer":
       return String(Math.ceil(least));
     case "double":
-      return double(least);
+      return doubleText(least);
     case "string":
       return '""';
     case "string_enum":

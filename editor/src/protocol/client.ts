@@ -21,7 +21,7 @@ export interface Socket {
 
 export type ConnectionState = "closed" | "connecting" | "open" | "waiting";
 
-export interface ClientOptions {
+interface ClientOptions {
   open: () => Socket;
   /** Delay before the first attempt to reconnect, and largest delay, s. */
   backoff?: { first: number; most: number };
@@ -158,10 +158,10 @@ export class ProtocolClient {
     socket.onopen = () => {
       this.attempts = 0;
       this.enter("open", "", 0);
-      this.expectLife();
+      this.watchLiveness();
     };
     socket.onmessage = (event) => {
-      this.expectLife();
+      this.watchLiveness();
       this.receive(String(event.data));
     };
     socket.onclose = (event) => this.lost(event.code, event.reason);
@@ -201,7 +201,7 @@ export class ProtocolClient {
   }
 
   /** Check the connection after a silence, since a pulled cable is not reported: send a request, or reconnect. */
-  private expectLife(): void {
+  private watchLiveness(): void {
     clearTimeout(this.watch);
     this.watch = setTimeout(() => {
       if (this.state !== "open") return;

@@ -39,8 +39,8 @@ export function likelyUnit(size: readonly number[]): "m" | "mm" {
 }
 
 /** Return the mesh in m as a binary STL; the original file if it is in m. */
-export function inMetres({ file, geometry }: Pick<MeshFile, "file" | "geometry">, worth: number): File {
-  if (worth === 1) return file;
+export function inMetres({ file, geometry }: Pick<MeshFile, "file" | "geometry">, metresPerUnit: number): File {
+  if (metresPerUnit === 1) return file;
   const flat = geometry.index ? geometry.toNonIndexed() : geometry;
   const position = flat.getAttribute("position");
   const triangles = Math.floor(position.count / 3);
@@ -51,7 +51,7 @@ export function inMetres({ file, geometry }: Pick<MeshFile, "file" | "geometry">
     for (let corner = 0; corner < 3; corner++) {
       const from = n * 3 + corner;
       [position.getX(from), position.getY(from), position.getZ(from)].forEach((value, axis) => {
-        view.setFloat32(at + corner * 12 + axis * 4, value * worth, true);
+        view.setFloat32(at + corner * 12 + axis * 4, value * metresPerUnit, true);
       });
     }
   }

@@ -3,11 +3,11 @@
 import { aimed, middle, targetsOf } from "../engine/aiming";
 import type { Engine } from "../engine/engine";
 import type { State } from "../store/state";
-import { now, setUi } from "../store/store";
+import { getState, setUi } from "../store/store";
 import type { Crosshair } from "../store/ui";
 
 function setCrosshair(change: Partial<Crosshair>): void {
-  setUi({ crosshair: { ...now().ui.crosshair, ...change } });
+  setUi({ crosshair: { ...getState().ui.crosshair, ...change } });
 }
 
 /** Choose a candidate. */
@@ -24,7 +24,7 @@ export function listAimed(): () => void {
 
 /** Choose the next or previous candidate, cyclically. */
 export function nextCandidate(by: 1 | -1 = 1): void {
-  const { candidates, chosen } = now().ui.crosshair;
+  const { candidates, chosen } = getState().ui.crosshair;
   const next = candidates[(candidates.indexOf(chosen) + by + candidates.length) % candidates.length];
   if (next !== undefined) chooseCandidate(next);
 }
@@ -36,11 +36,11 @@ export function nextCandidate(by: 1 | -1 = 1): void {
 export function followCrosshair(engine: Engine, drawn: () => void): () => void {
   let best = "";
   let reported = "";
-  const look = () => {
+  const update = () => {
     const { things, height } = engine.shown();
     const { ray, cone } = middle(engine.view.camera, height);
     const ids = aimed(targetsOf(things.values()), ray, cone, best).map((each) => each.id);
-    const { candidates, chosen } = now().ui.crosshair;
+    const { candidates, chosen } = getState().ui.crosshair;
     const stays = chosen !== best && ids.includes(chosen);
     best = ids[0] ?? "";
     const next = stays ? chosen : best;
@@ -52,8 +52,8 @@ export function followCrosshair(engine: Engine, drawn: () => void): () => void {
     reported = next;
     setUi({ aimed: next || undefined });
   };
-  const end = engine.watch(look);
-  look();
+  const end = engine.watch(update);
+  update();
   return () => {
     end();
     engine.hover("");

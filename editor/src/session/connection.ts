@@ -2,19 +2,19 @@
 
 import { type CallOptions, ProtocolClient } from "../protocol/client";
 import type { Requests } from "../protocol/types";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 import { note } from "./log";
 
 /** Create the client of this page. */
 export function createClient(): ProtocolClient {
   const client = new ProtocolClient({ open: () => new WebSocket(address()) as never });
-  now().runtime.client = client;
+  getState().runtime.client = client;
   return client;
 }
 
 /** Return the client of this page. */
 export function theClient(): ProtocolClient {
-  const { client } = now().runtime;
+  const { client } = getState().runtime;
   if (!client) throw new Error("The page has no client yet. main.tsx creates it.");
   return client;
 }
@@ -43,5 +43,5 @@ export function call<N extends keyof Requests>(
 
 /** Return whether the server knows one of our additional requests. */
 export function serves(request: keyof Requests): boolean {
-  return now().connection.server?.supported_rpc_requests.includes(request) ?? false;
+  return getState().connection.server?.supported_rpc_requests.includes(request) ?? false;
 }

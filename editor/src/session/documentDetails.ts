@@ -2,7 +2,7 @@
 
 import { inUserLanguage } from "../i18n/serverMessages";
 import type { State } from "../store/state";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 import { call, serves } from "./connection";
 import type { Follower } from "./follower";
 
@@ -37,7 +37,7 @@ async function loadDetails(document: string, scene: string, project: boolean, is
     ] as const) {
       void ask(
         call("GetViewState", { scope, document: of }).then(({ values }) => ({
-          view: { ...now().view, [part]: values },
+          view: { ...getState().view, [part]: values },
         })),
       );
     }

@@ -1,7 +1,7 @@
 /** The engine of the visible view, for panels and commands; null without a view. */
 
 import type { Engine } from "../engine/engine";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 
 declare module "../store/runtime" {
   interface Runtime {
@@ -17,10 +17,10 @@ declare global {
 }
 
 export function setEngine(engine: Engine | null): void {
-  now().runtime.engine = engine;
+  getState().runtime.engine = engine;
   window.__engine = engine;
 }
 
 export function theEngine(): Engine | null {
-  return now().runtime.engine ?? null;
+  return getState().runtime.engine ?? null;
 }

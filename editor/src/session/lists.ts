@@ -2,7 +2,7 @@
 
 import type { ViewScope } from "../protocol/types";
 import { translatedAction, translatedType } from "../store/objectTypeTexts";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 import { call, serves } from "./connection";
 
 export async function loadTypes(): Promise<void> {
@@ -43,7 +43,7 @@ export async function loadGeneralState(): Promise<void> {
 
 /** Load the actions of a type, unless they are loaded. */
 export async function loadActions(type: string): Promise<void> {
-  if (type in now().types.actions) return;
+  if (type in getState().types.actions) return;
   const actions = await call("GetActions", { type });
   store.setState((state) => ({
     types: { ...state.types, actions: { ...state.types.actions, [type]: actions.map(translatedAction) } },

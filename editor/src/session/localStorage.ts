@@ -31,15 +31,15 @@ export function remember(key: keyof typeof KEYS, value: string): void {
 }
 
 /** Number of remembered users. */
-const PEOPLE = 6;
+const MAX_USERS = 6;
 
 /** Return the users who joined with this browser, newest first. */
-export function peopleHere(): string[] {
+export function recentUsers(): string[] {
   return remembered("names").split("\n").filter(Boolean);
 }
 
-export function rememberPerson(name: string): void {
-  remember("names", [name, ...peopleHere().filter((each) => each !== name)].slice(0, PEOPLE).join("\n"));
+export function rememberUser(name: string): void {
+  remember("names", [name, ...recentUsers().filter((each) => each !== name)].slice(0, MAX_USERS).join("\n"));
 }
 
 /** Move a token from the address, where it would be visible, to the storage of the browser. */

@@ -1,15 +1,15 @@
 /** The recent activity of this page for the diagnosis file: events, refusals, faults. It is not sent. */
 
 import type { DiaryEntry } from "../store/runtime";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 
 /** Number of entries, and characters of each. */
 const MOST = 400;
 const LONGEST = 400;
 
-export function note(what: DiaryEntry["what"], text: string): void {
-  const { diary } = now().runtime;
-  diary.push({ time: new Date().toISOString(), what, text: text.slice(0, LONGEST) });
+export function note(kind: DiaryEntry["kind"], text: string): void {
+  const { diary } = getState().runtime;
+  diary.push({ time: new Date().toISOString(), kind, text: text.slice(0, LONGEST) });
   if (diary.length > MOST) diary.splice(0, diary.length - MOST);
 }
 

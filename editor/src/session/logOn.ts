@@ -2,7 +2,7 @@
 
 import { translate } from "../i18n/serverMessages";
 import { type LogOnArgs, type LogOnChangedData, type LogOnData, ROLES } from "../protocol/types";
-import { now, setConnection } from "../store/store";
+import { getState, setConnection } from "../store/store";
 import { call } from "./connection";
 
 declare module "../store/runtime" {
@@ -15,7 +15,7 @@ declare module "../store/runtime" {
 /** Stored for this page only, so that another person who opens the browser again has to log on. */
 const KEY = "arcor2-hw.session";
 
-function store(session: string): void {
+function storeSession(session: string): void {
   setConnection({ session });
   try {
     sessionStorage.setItem(KEY, session);
@@ -24,24 +24,24 @@ function store(session: string): void {
   }
 }
 
-function stored(): string {
+function storedSession(): string {
   try {
     return sessionStorage.getItem(KEY) ?? "";
   } catch {
-    return now().connection.session;
+    return getState().connection.session;
   }
 }
 
 /** Continue the session of this page, or wait until a person logs on. */
 export async function waitForPerson(): Promise<void> {
-  take((await resumed()) ?? (await entered()));
+  applyLogOn((await resumeSession()) ?? (await nextLogOn()));
   setConnection({ status: "joining", reason: "" });
 }
 
-async function resumed(): Promise<LogOnData | null> {
+async function resumeSession(): Promise<LogOnData | null> {
   let tried = "";
   // Another session may have started by the card of the next person.
-  for (let session = stored(); session && session !== tried; session = stored()) {
+  for (let session = storedSession(); session && session !== tried; session = storedSession()) {
     const data = await call("LogOn", { session }).catch(() => null);
     if (data) return data;
     tried = session;
@@ -49,10 +49,10 @@ async function resumed(): Promise<LogOnData | null> {
   return null;
 }
 
-function entered(): Promise<LogOnData> {
-  store("");
+function nextLogOn(): Promise<LogOnData> {
+  storeSession("");
   return new Promise((resolve) => {
-    now().runtime.takeLogOn = resolve;
+    getState().runtime.takeLogOn = resolve;
     setConnection({ status: "person" });
   });
 }
@@ -60,8 +60,8 @@ function entered(): Promise<LogOnData> {
 /** Log a person on. Reject with the refusal of the server. */
 export async function logOn(args: LogOnArgs): Promise<void> {
   const data = await call("LogOn", args);
-  take(data);
-  const { runtime } = now();
+  applyLogOn(data);
+  const { runtime } = getState();
   runtime.takeLogOn?.(data);
   runtime.takeLogOn = undefined;
 }
@@ -70,14 +70,14 @@ export async function logOn(args: LogOnArgs): Promise<void> {
 export const logOff = (): Promise<unknown> => call("LogOff");
 
 /** Handle LogOnChanged. `enter` starts the log-on again after a log-off. */
-export function changed(data: LogOnChangedData, enter: () => void): void {
+export function handleLogOnChanged(data: LogOnChangedData, enter: () => void): void {
   setConnection({ role: ROLES[data.role] });
   if (data.person) return;
   setConnection({ reason: translate({ ...data, text: data.reason }) });
   enter();
 }
 
-function take({ person, role, session, log_off_after }: LogOnData): void {
-  store(session);
+function applyLogOn({ person, role, session, log_off_after }: LogOnData): void {
+  storeSession(session);
   setConnection({ user: person.name, role: ROLES[role], logOffAfter: log_off_after });
 }

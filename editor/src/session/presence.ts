@@ -3,7 +3,7 @@
 import type { Presence } from "../protocol/types";
 import { openId } from "../store/selectors";
 import type { State } from "../store/state";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 import { call, serves } from "./connection";
 import type { Follower } from "./follower";
 
@@ -15,7 +15,7 @@ function atOperatorScreen(): boolean {
   return typeof location !== "undefined" && location.hash.startsWith("#/operator");
 }
 
-export function presenceOf(state: State): Presence {
+function presenceOf(state: State): Presence {
   if (atOperatorScreen()) return { document: "", selected: [], view: "operator" };
   const { selection, aimed } = state.ui;
   return {
@@ -41,7 +41,7 @@ export class PresenceReporter implements Follower {
     if (JSON.stringify(presenceOf(state)) === this.reported) return;
     this.timer = setTimeout(() => {
       this.timer = undefined;
-      const latest = now();
+      const latest = getState();
       if (latest.connection.status !== "ready" || !serves("UpdatePresence")) return;
       const presence = presenceOf(latest);
       this.reported = JSON.stringify(presence);

@@ -6,7 +6,7 @@ import type { ProgramPosition } from "../protocol/types";
 import { withRuns } from "../store/reduce";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
-import { now, store } from "../store/store";
+import { getState, store } from "../store/store";
 import { call, serves } from "./connection";
 import type { Follower } from "./follower";
 import { loadActions } from "./lists";
@@ -70,12 +70,12 @@ function takePosition(position: ProgramPosition): void {
   const ids = position.branches.flatMap(({ frames }) => frames.slice(0, -1).map((each) => each.action_id));
   store.setState(({ program }) => {
     const running = [...ids, ...program.running.filter((id) => !ids.includes(id))];
-    return { program: { ...program, position, running: isRunning(now()) ? running : program.running } };
+    return { program: { ...program, position, running: isRunning(getState()) ? running : program.running } };
   });
 }
 
 function takeTrace({ run, entries }: { run: number; entries: State["program"]["trace"] }): void {
-  const known = now().program.trace.filter((each) => each.run === run);
+  const known = getState().program.trace.filter((each) => each.run === run);
   const newer = new Set(known.map((each) => each.number));
   const older = entries.filter((each) => !newer.has(each.number)).map(inUserLanguage);
   const trace = [...older, ...known].sort((a, b) => a.number - b.number);

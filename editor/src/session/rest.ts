@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type ServerMessage, translate } from "../i18n/serverMessages";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 import { remembered } from "./localStorage";
 
 /** Time limit of a request, and of one that transfers a file, s. */
@@ -27,7 +27,7 @@ export async function rest(
   const headers = new Headers();
   const token = remembered("token");
   if (token) headers.set("Authorization", `Bearer ${token}`);
-  const { session } = now().connection;
+  const { session } = getState().connection;
   if (session) headers.set("Arcor2-Session", session);
   if (json !== undefined) headers.set("Content-Type", "application/json");
   const content = json === undefined ? body : JSON.stringify(json);

@@ -5,7 +5,7 @@ const call = vi.fn();
 vi.mock("./connection", () => ({ call, serves: (request: string) => request === "GetViewState" }));
 
 const { Session } = await import("./session");
-const { now, setConnection, store } = await import("../store/store");
+const { getState, setConnection, store } = await import("../store/store");
 
 beforeEach(() => {
   vi.stubGlobal("window", new EventTarget());
@@ -42,10 +42,10 @@ test("what a user sees and changes is never replaced by the stored view state", 
   enter("Olga");
   await vi.waitFor(() => expect(answers).toHaveLength(2));
   await new Promise((resolve) => setTimeout(resolve));
-  expect(now().connection.status).toBe("joining");
+  expect(getState().connection.status).toBe("joining");
   for (const answer of answers) answer({ dismissed_run: 3 });
-  await vi.waitFor(() => expect(now().connection.status).toBe("ready"));
-  expect(now().view.general).toEqual({ dismissed_run: 3 });
+  await vi.waitFor(() => expect(getState().connection.status).toBe("ready"));
+  expect(getState().view.general).toEqual({ dismissed_run: 3 });
   await new Promise((resolve) => setTimeout(resolve));
   expect(answers, "requested again while the user may change it").toHaveLength(2);
 });
@@ -60,7 +60,7 @@ test("a user who goes to another workplace releases own locks before the connect
   const session = new Session(client as never);
   setConnection({ user: "Olga" });
   store.setState({ locks: { robot: "Olga", tester: "Petr" } });
-  await session.giveUp();
+  await session.releaseLocksAndLeave();
   expect(sent).toEqual(["WriteUnlock robot", "stop"]);
-  expect(now().connection.status).toBe("left");
+  expect(getState().connection.status).toBe("left");
 });

@@ -19,7 +19,7 @@ import {
 } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import { OFFLINE, type State } from "../store/state";
-import { applyEvent, now, setConnection, store } from "../store/store";
+import { applyEvent, getState, setConnection, store } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { RobotArms } from "./arms";
 import { call } from "./connection";
@@ -37,7 +37,7 @@ const TOKEN_REFUSED = 4401;
 /** Code of the error if a request needs a token. */
 const TOKEN_NEEDED = "token_needed";
 /** Time limit for releasing locks before this page leaves the cell, s; the server releases them later otherwise. */
-const GIVE_UP_TIMEOUT = 1;
+const RELEASE_TIMEOUT = 1;
 
 declare module "../store/runtime" {
   interface Runtime {
@@ -100,8 +100,8 @@ export class Session {
   }
 
   /** Release the locks of this user, and leave. */
-  async giveUp(): Promise<void> {
-    await Promise.race([releaseOwnLocks(), new Promise((resolve) => setTimeout(resolve, GIVE_UP_TIMEOUT * 1000))]);
+  async releaseLocksAndLeave(): Promise<void> {
+    await Promise.race([releaseOwnLocks(), new Promise((resolve) => setTimeout(resolve, RELEASE_TIMEOUT * 1000))]);
     this.leave();
   }
 
@@ -112,30 +112,33 @@ export class Session {
 
   /** Report the presence after a change that is not part of the state: another screen is shown. */
   reportPresence(): void {
-    this.presence.follow(now());
+    this.presence.follow(getState());
   }
 
   /** Request the data again that contain texts of the server, which are translated when they arrive. */
   private retranslate(): void {
-    if (now().connection.status !== "ready") return;
+    if (getState().connection.status !== "ready") return;
     for (const each of this.details) each.reset();
-    store.setState(({ program }) => ({ program: isRunning(now()) ? { ...program, trace: [] } : program }));
+    store.setState(({ program }) => ({ program: isRunning(getState()) ? { ...program, trace: [] } : program }));
     Promise.all([subscribe(), loadTypes(), loadLists()]).catch(() => {}); // offline: requested after the reconnect
   }
 
   private onEvent(event: ServerEvent): void {
     if (event.event === "RobotJoints") telemetry.takeJoints(event.data);
     else if (event.event === "RobotEef") telemetry.takeEef(event.data);
-    else if (event.event === "ObjectObservations") now().runtime.takeObservations?.(event.data);
-    else if (event.event === "ObjectPoints") now().runtime.takePoints?.(event.data);
-    else if (event.event === "AlarmChanged") for (const take of now().runtime.takeAlarm ?? []) take(event.data);
-    else if (event.event === "RecordingChanged") for (const take of now().runtime.takeRecording ?? []) take(event.data);
-    else if (event.event === "PartsChanged") for (const take of now().runtime.takeParts ?? []) take(event.data);
-    else if (event.event === "CellChanged") for (const take of now().runtime.takeCell ?? []) take(event.data);
+    else if (event.event === "ObjectObservations") getState().runtime.takeObservations?.(event.data);
+    else if (event.event === "ObjectPoints") getState().runtime.takePoints?.(event.data);
+    else if (event.event === "AlarmChanged") for (const take of getState().runtime.takeAlarm ?? []) take(event.data);
+    else if (event.event === "RecordingChanged")
+      for (const take of getState().runtime.takeRecording ?? []) take(event.data);
+    else if (event.event === "PartsChanged") for (const take of getState().runtime.takeParts ?? []) take(event.data);
+    else if (event.event === "CellChanged") for (const take of getState().runtime.takeCell ?? []) take(event.data);
     else if (event.event === "LogOnChanged")
-      void import("./logOn").then(({ changed }) => changed(event.data, () => this.onState("open", "", 0)));
+      void import("./logOn").then(({ handleLogOnChanged }) =>
+        handleLogOnChanged(event.data, () => this.onState("open", "", 0)),
+      );
     else if (event.event === "InterlockStates" || event.event === "InterlockChanged")
-      for (const take of now().runtime.takeInterlocks ?? []) take(event);
+      for (const take of getState().runtime.takeInterlocks ?? []) take(event);
     else {
       // Frequent events would displace all other entries of the diary.
       if (event.event !== "MovePreview" && event.event !== "UserPresence")
@@ -166,7 +169,7 @@ export class Session {
       setConnection({ status: "joining" });
       void this.enter(this.epoch);
     } else if (state === "waiting") {
-      const was = now().connection.status;
+      const was = getState().connection.status;
       setConnection({
         status: was === "ready" || was === "joining" || was === "lost" ? "lost" : "connecting",
         reason: reason || this.unreachable(),
@@ -199,7 +202,7 @@ export class Session {
       (response) => response.ok,
       () => false,
     );
-    if (now().connection.status === "ready" || answers === this.socketRefused) return;
+    if (getState().connection.status === "ready" || answers === this.socketRefused) return;
     this.socketRefused = answers;
     if (epoch === this.epoch) setConnection({ reason: this.unreachable() });
   }
@@ -215,7 +218,7 @@ export class Session {
           shared,
         });
       }
-      const { shared, user } = now().connection;
+      const { shared, user } = getState().connection;
       if (shared) await (await import("./logOn")).waitForPerson();
       else if (user) await call("RegisterUser", { user_name: user });
       else this.leave();
@@ -255,7 +258,7 @@ export class Session {
 
 /** Release the locks that this user held when the connection was lost or the page was closed. */
 async function releaseOwnLocks(): Promise<void> {
-  const { locks, connection } = now();
+  const { locks, connection } = getState();
   const own = Object.keys(locks).filter((id) => locks[id] === connection.user);
   await Promise.allSettled(own.map((object_id) => call("WriteUnlock", { object_id })));
 }
@@ -273,13 +276,13 @@ async function subscribe(): Promise<void> {
 /** Create the session of this page. */
 export function createSession(client: ProtocolClient): Session {
   const session = new Session(client);
-  now().runtime.session = session;
+  getState().runtime.session = session;
   return session;
 }
 
 /** Return the session of this page. */
 export function theSession(): Session {
-  const { session } = now().runtime;
+  const { session } = getState().runtime;
   if (!session) throw new Error("The page has no session yet. main.tsx creates it.");
   return session;
 }

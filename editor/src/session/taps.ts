@@ -2,10 +2,10 @@
 
 import type { Vector3 } from "three";
 import type { Hit } from "../engine/picking";
-import { now } from "../store/store";
+import { getState } from "../store/store";
 
 /** Handles a tap and returns true, or returns false so that the tap selects an item. */
-export type TapHandler = (hits: Hit[], floor: Vector3 | null) => boolean;
+type TapHandler = (hits: Hit[], floor: Vector3 | null) => boolean;
 
 declare module "../store/runtime" {
   interface Runtime {
@@ -15,7 +15,7 @@ declare module "../store/runtime" {
 
 /** Pass the taps to a handler from now on. Return a function that removes the handler. */
 export function takeTaps(handler: TapHandler): () => void {
-  const { runtime } = now();
+  const { runtime } = getState();
   runtime.tapHandler = handler;
   return () => {
     if (runtime.tapHandler === handler) runtime.tapHandler = undefined;
@@ -23,6 +23,6 @@ export function takeTaps(handler: TapHandler): () => void {
 }
 
 /** Pass a tap to the handler. Return whether it was handled. */
-export function tapTaken(hits: Hit[], floor: Vector3 | null): boolean {
-  return now().runtime.tapHandler?.(hits, floor) ?? false;
+export function handleTap(hits: Hit[], floor: Vector3 | null): boolean {
+  return getState().runtime.tapHandler?.(hits, floor) ?? false;
 }

@@ -1,13 +1,13 @@
 /** Users who left: the locks they still hold, and whether others have the document open. Pure functions. */
 
-import { compared } from "../formats";
+import { compareTexts } from "../formats";
 import type { State } from "./state";
 
 /** Return users who hold locks but are not connected. */
 export function absentLockHolders(state: State): string[] {
   if (state.connection.status !== "ready") return [];
   const owners = new Set(Object.values(state.locks));
-  return [...owners].filter((name) => name !== state.connection.user && !state.users[name]?.online).sort(compared);
+  return [...owners].filter((name) => name !== state.connection.user && !state.users[name]?.online).sort(compareTexts);
 }
 
 /** Return other users who have the open document open, by the server's rule for RunPackage (docs/protocol.md). */
@@ -21,5 +21,5 @@ export function usersOfDocument(state: State): string[] {
       return owners.has(user) || (presence ? ids.includes(presence.document) : role !== "operator");
     })
     .map(({ user }) => user)
-    .sort(compared);
+    .sort(compareTexts);
 }

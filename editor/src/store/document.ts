@@ -6,7 +6,7 @@ import { functionOf, inScope } from "./scope";
 import type { OpenDocument } from "./state";
 
 /** Return a scene and its project, split into records by id. */
-export function opened(scene: Scene, project: Project | null): OpenDocument {
+export function documentFrom(scene: Scene, project: Project | null): OpenDocument {
   const { objects, ...bareScene } = scene;
   const doc: OpenDocument = {
     scene: bareScene,
@@ -85,7 +85,7 @@ export function itemOf(doc: OpenDocument | null, id: string): unknown {
 }
 
 /** Return the document after an event, with the same function open; the same object if the event does not affect it. */
-export function changed(doc: OpenDocument, event: ServerEvent): OpenDocument {
+export function documentAfter(doc: OpenDocument, event: ServerEvent): OpenDocument {
   const program = inScope(doc, []);
   const after = afterEvent(program, event);
   if (after === program) return doc;

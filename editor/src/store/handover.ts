@@ -20,14 +20,14 @@ function itemRequest(value: unknown): ItemRequest | null {
   return typeof by === "string" && typeof at === "number" ? { by, at } : null;
 }
 
-export const keyOf = (id: string): string => KEY + id;
+export const requestKey = (id: string): string => KEY + id;
 
 /** Return whether the user has requested an item. */
 export function hasRequested(state: State, id: string): boolean {
-  return itemRequest(state.view.shared[keyOf(id)])?.by === state.connection.user;
+  return itemRequest(state.view.shared[requestKey(id)])?.by === state.connection.user;
 }
 
-export interface HandOver {
+interface HandOver {
   /** New requests for items that the user holds. */
   wanted: { id: string; by: string }[];
   /** Items that the user requested and that are released now. */

@@ -4,7 +4,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { inUserLanguage } from "../i18n/serverMessages";
 import type { Run, ServerEvent, TaskProgress, TaskStateData } from "../protocol/types";
-import { changed, itemOf, opened } from "./document";
+import { documentAfter, documentFrom, itemOf } from "./document";
 import { translatedType } from "./objectTypeTexts";
 import { put, without } from "./records";
 import { inScope } from "./scope";
@@ -14,7 +14,7 @@ import type { Draft, Selection } from "./ui";
 /** Largest number of stored notices, entries of the trace, and results of single actions. */
 const NOTICES = 200;
 const TRACE = 1000;
-const TRIED = 50;
+const SINGLE_RESULTS = 50;
 
 /** Return the notices with one more. `time` is in ms since 1970. */
 export function notice(
@@ -43,14 +43,14 @@ const CLOSED = {
 /** Return the changes made by an event that arrived at `time`, ms since 1970. */
 export function reduce(state: State, event: ServerEvent, time: number): Partial<State> {
   if (state.doc) {
-    const doc = changed(state.doc, event);
-    if (doc !== state.doc) return { doc, ...lists(state, event), ui: screenOf(state, doc) };
+    const doc = documentAfter(state.doc, event);
+    if (doc !== state.doc) return { doc, ...reduceLists(state, event), ui: screenOf(state, doc) };
   }
   switch (event.event) {
     case "OpenScene":
-      return open(state, opened(event.data.scene, null));
+      return open(state, documentFrom(event.data.scene, null));
     case "OpenProject":
-      return open(state, opened(event.data.scene, event.data.project));
+      return open(state, documentFrom(event.data.scene, event.data.project));
     case "SceneClosed":
     case "ProjectClosed":
       // The document leaves the screen with ShowMainScreen; a project that is about to run stays.
@@ -59,14 +59,14 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
       return {
         ...CLOSED,
         view: { ...state.view, user: {}, shared: {}, scene: {} },
-        ui: shut(state),
+        ui: uiWithoutDocument(state),
         program: { ...state.program, running: [] },
         lists: { ...state.lists, shown: event.data.what, highlight: event.data.highlight ?? "" },
       };
     case "SceneChanged":
     case "ProjectChanged":
     case "PackageChanged":
-      return lists(state, event);
+      return reduceLists(state, event);
     case "ObjectsLocked":
       return {
         locks: { ...state.locks, ...Object.fromEntries(event.data.object_ids.map((id) => [id, event.data.owner])) },
@@ -113,7 +113,7 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
       return { reach: put(state.reach, key, { ...event.data, items: Object.values(known) }) };
     }
     case "ViewStateChanged":
-      return viewState(state, event.data);
+      return reduceViewState(state, event.data);
     case "ForcesChanged":
       return { forces: event.data.forces };
     case "NodesChanged":
@@ -123,9 +123,9 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
       return notice(state, level, event.data.message, time);
     }
     case "TaskState":
-      return { tasks: put(state.tasks, event.data.id, event.data), ...over(state, event.data, time) };
+      return { tasks: put(state.tasks, event.data.id, event.data), ...taskMessage(state, event.data, time) };
     default:
-      return live(state, event, time) ?? program(state, event) ?? {};
+      return reduceLive(state, event, time) ?? reduceProgram(state, event) ?? {};
   }
 }
 
@@ -137,16 +137,16 @@ const OUTCOMES: Record<TaskProgress, MessageDescriptor> = {
 };
 
 /** Add a finished task to the stored messages. */
-function over(
+function taskMessage(
   state: State,
-  { title, state: how, message }: TaskStateData,
+  { title, state: outcome, message }: TaskStateData,
   time: number,
 ): Pick<State, "messageLog"> | object {
-  if (how === "running") return {};
+  if (outcome === "running") return {};
   const { messageLog } = notice(
     state,
-    how === "failed" ? "error" : "info",
-    [t`${title}: ${i18n._(OUTCOMES[how])}.`, message].filter(Boolean).join(" "),
+    outcome === "failed" ? "error" : "info",
+    [t`${title}: ${i18n._(OUTCOMES[outcome])}.`, message].filter(Boolean).join(" "),
     time,
   );
   return { messageLog };
@@ -160,11 +160,11 @@ function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
   }
   // A project that is created on the open scene has the tools of the scene, too: the user may have just opened one.
   const tool = sameScene && !state.doc?.project ? state.ui.tool : "";
-  return { ...CLOSED, doc, ui: { ...shut(state), tool } };
+  return { ...CLOSED, doc, ui: { ...uiWithoutDocument(state), tool } };
 }
 
 /** Return the screen state without what belonged to the open document. */
-function shut(state: State): State["ui"] {
+function uiWithoutDocument(state: State): State["ui"] {
   const { draft: _, ...ui } = state.ui;
   return { ...ui, selection: null, connecting: null, picked: null, ghost: null, mode: "3d", tool: "" };
 }
@@ -192,7 +192,7 @@ function keptDraft(draft: Draft | undefined, doc: OpenDocument): Draft | undefin
 }
 
 /** Return the lists of the home screen after an event. */
-function lists(state: State, event: ServerEvent): Partial<State> {
+function reduceLists(state: State, event: ServerEvent): Partial<State> {
   const removed = event.change_type === "remove";
   const merged = <T extends { id: string }>(items: T[] | null, item: T): T[] | null => {
     if (!items) return null;
@@ -213,7 +213,7 @@ function lists(state: State, event: ServerEvent): Partial<State> {
   }
 }
 
-function viewState(state: State, data: import("../protocol/types").ViewState): Partial<State> {
+function reduceViewState(state: State, data: import("../protocol/types").ViewState): Partial<State> {
   const { doc, connection } = state;
   const parts: (keyof State["view"])[] = [];
   if (data.document === "") parts.push("general");
@@ -237,7 +237,7 @@ function isAnswering(objects: State["live"]["objects"]): boolean {
 }
 
 /** Return the state of the online scene; null if the event does not affect it. */
-function live(state: State, event: ServerEvent, time: number): Partial<State> | null {
+function reduceLive(state: State, event: ServerEvent, time: number): Partial<State> | null {
   const now = state.live;
   const become = (change: Partial<typeof now>) => ({ live: { ...now, ...change } });
   switch (event.event) {
@@ -298,7 +298,7 @@ function live(state: State, event: ServerEvent, time: number): Partial<State> | 
     case "ActionResult":
       return {
         ...become({ executing: "", result: event.data }),
-        tried: [...state.tried, { ...event.data, time }].slice(-TRIED),
+        singleResults: [...state.singleResults, { ...event.data, time }].slice(-SINGLE_RESULTS),
       };
     case "ActionCancelled":
       return become({ executing: "" });
@@ -323,7 +323,7 @@ export function withRuns(program: State["program"], added: Run[]): State["progra
 }
 
 /** Return the state of the running program; null if the event does not affect it. */
-function program(state: State, event: ServerEvent): Partial<State> | null {
+function reduceProgram(state: State, event: ServerEvent): Partial<State> | null {
   const now = state.program;
   const become = (change: Partial<typeof now>) => ({ program: { ...now, ...change } });
   switch (event.event) {
@@ -345,7 +345,7 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
       return become({ held: null });
     case "PackageInfo":
       return {
-        ...open(state, { ...opened(event.data.scene, event.data.project), unsaved: false, closed: true }),
+        ...open(state, { ...documentFrom(event.data.scene, event.data.project), unsaved: false, closed: true }),
         ...become({ packageId: event.data.package_id, packageName: event.data.package_name }),
         live: OFFLINE,
       };

@@ -16,7 +16,7 @@ export interface HeldLock {
 
 export interface DiaryEntry {
   time: string;
-  what: "event" | "refused" | "fault" | "connection";
+  kind: "event" | "refused" | "fault" | "connection";
   text: string;
 }
 

@@ -47,7 +47,7 @@ import { initialRuntime, type Runtime } from "./runtime";
 import { initialUi, type Ui } from "./ui";
 
 /** `person`: a person has to log on. `joining`: connected and loading. `lost`: reconnecting. */
-export type ConnectionStatus = "left" | "connecting" | "person" | "joining" | "ready" | "lost" | "refused";
+type ConnectionStatus = "left" | "connecting" | "person" | "joining" | "ready" | "lost" | "refused";
 
 export interface Connection {
   status: ConnectionStatus;
@@ -65,11 +65,12 @@ export interface Connection {
   server: SystemInfoData | null;
 }
 
-export type Of<T> = T & { pointId: string };
+/** An item of an action point. */
+export type OnPoint<T> = T & { pointId: string };
 
 /** Actions and connections of the program, or of a function. */
 export interface Body {
-  actions: Record<string, Of<Action>>;
+  actions: Record<string, OnPoint<Action>>;
   logic: Record<string, LogicItem>;
 }
 
@@ -85,10 +86,10 @@ export interface OpenDocument {
   closed: boolean;
   objects: Record<string, SceneObject>;
   points: Record<string, BareActionPoint>;
-  orientations: Record<string, Of<NamedOrientation>>;
-  joints: Record<string, Of<ProjectRobotJoints>>;
+  orientations: Record<string, OnPoint<NamedOrientation>>;
+  joints: Record<string, OnPoint<ProjectRobotJoints>>;
   /** Actions and connections of the open function, otherwise of the program. */
-  actions: Record<string, Of<Action>>;
+  actions: Record<string, OnPoint<Action>>;
   logic: Record<string, LogicItem>;
   program: Body;
   functions: Record<string, OpenFunction>;
@@ -173,7 +174,7 @@ export interface Program {
 }
 
 /** Result of an action that was run alone. */
-export interface Tried extends ActionResultData {
+interface SingleResult extends ActionResultData {
   time: number;
 }
 
@@ -217,7 +218,7 @@ export interface State {
   /** Last known values of dynamic parameters, so that they can be chosen offline too. */
   dynamicValues: Record<string, string[]>;
   /** Results of actions that were run alone, newest last. */
-  tried: Tried[];
+  singleResults: SingleResult[];
   /** Outputs that persons force, on any device. */
   forces: readonly ForcedPoint[];
   /** The computers on which devices run; null until they are known. */
@@ -286,7 +287,7 @@ export function initialState(): State {
     view: { user: {}, shared: {}, scene: {}, general: {} },
     live: OFFLINE,
     program: NO_PROGRAM,
-    tried: [],
+    singleResults: [],
     forces: [],
     nodes: null,
     tasks: {},

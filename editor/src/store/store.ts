@@ -15,7 +15,7 @@ export function useEditor<T>(select: (state: State) => T): T {
   return useStore(store, select);
 }
 
-export const now = (): State => store.getState();
+export const getState = (): State => store.getState();
 
 export function applyEvent(event: ServerEvent): void {
   store.setState((state) => reduce(state, event, Date.now()));
@@ -31,21 +31,21 @@ export function setUi(change: Partial<Ui>): void {
 
 /** Store the unsaved form of an object or type; null removes it after it was saved or reverted. */
 export function keepForm(key: string, draft: FormDraft | null): void {
-  const { [key]: _, ...others } = now().ui.forms;
+  const { [key]: _, ...others } = getState().ui.forms;
   setUi({ forms: draft ? { ...others, [key]: draft } : others });
 }
 
 /** Select an item. An action or connection is shown in the program or function that contains it. */
 export function select(selection: Selection | null): void {
-  const { doc } = now();
+  const { doc } = getState();
   const inside = selection?.kind === "action" || selection?.kind === "logic";
   const path = inside && doc ? pathTo(doc, selection.id) : undefined;
-  if (path && path !== doc?.path) show(path);
+  if (path && path !== doc?.path) showFunction(path);
   setUi({ selection });
 }
 
 /** Show the last function of a path of nested functions in all views; the program if the path is empty. */
-export function show(path: readonly string[]): void {
+export function showFunction(path: readonly string[]): void {
   store.setState(({ doc, ui }) => ({
     doc: doc && inScope(doc, path),
     ui: { ...ui, selection: null, connecting: null, picked: null },

@@ -5,7 +5,7 @@
 
 import type { EefPose, RobotEefData, RobotJointsData } from "../protocol/types";
 
-export interface Sample {
+interface Sample {
   /** Time of arrival, s, as `performance.now()`. */
   at: number;
   /** Time of measurement by the clock of the server, s; like `at` if unknown. */

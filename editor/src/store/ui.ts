@@ -77,7 +77,7 @@ export interface Jogging extends MotionOptions {
 }
 
 /** A running measurement of an object by its focus points. It continues while other panels are open. */
-export interface Measurement {
+interface Measurement {
   objectId: string;
   /** Numbers of the recorded points. */
   recorded: readonly number[];

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { amount, show, stepWords } from "./amounts";
+import { amountText, parseAmount, stepWords } from "./amounts";
 
 const DEGREE = Math.PI / 180;
 
@@ -17,7 +17,7 @@ describe("an amount", () => {
     ["1cm-2mm", 0.008],
     [".5*4", 0.002],
     ["−4", -0.004],
-  ])("%s", (text, value) => expect(amount(text, 0.1, "mm")).toBeCloseTo(value, 12));
+  ])("%s", (text, value) => expect(parseAmount(text, 0.1, "mm")).toBeCloseTo(value, 12));
 
   it.each([
     ["+12.5", 0.1125],
@@ -25,32 +25,32 @@ describe("an amount", () => {
     ["+=1", 0.101],
     ["-=3mm", 0.097],
     ["+10-2", 0.108],
-  ])("%s changes what is there", (text, value) => expect(amount(text, 0.1, "mm")).toBeCloseTo(value, 12));
+  ])("%s changes what is there", (text, value) => expect(parseAmount(text, 0.1, "mm")).toBeCloseTo(value, 12));
 
   it("is relative with a sign or by option", () => {
-    expect(amount("-3mm", 0.1, "m", true)).toBeCloseTo(0.097, 12);
-    expect(amount("5", 0.1, "cm", true)).toBeCloseTo(0.15, 12);
+    expect(parseAmount("-3mm", 0.1, "m", true)).toBeCloseTo(0.097, 12);
+    expect(parseAmount("5", 0.1, "cm", true)).toBeCloseTo(0.15, 12);
   });
 
   it("of an angle can have minutes and seconds", () => {
-    expect(amount("90", 0, "°")).toBeCloseTo(Math.PI / 2, 12);
-    expect(amount("90°", 0, "rad")).toBeCloseTo(Math.PI / 2, 12);
-    expect(amount("+1′", DEGREE, "°")).toBeCloseTo(DEGREE * (1 + 1 / 60), 12);
-    expect(amount('3"', 0, "°")).toBeCloseTo(DEGREE / 1200, 12);
-    expect(amount("1.5rad", 0, "°")).toBeCloseTo(1.5, 12);
+    expect(parseAmount("90", 0, "°")).toBeCloseTo(Math.PI / 2, 12);
+    expect(parseAmount("90°", 0, "rad")).toBeCloseTo(Math.PI / 2, 12);
+    expect(parseAmount("+1′", DEGREE, "°")).toBeCloseTo(DEGREE * (1 + 1 / 60), 12);
+    expect(parseAmount('3"', 0, "°")).toBeCloseTo(DEGREE / 1200, 12);
+    expect(parseAmount("1.5rad", 0, "°")).toBeCloseTo(1.5, 12);
   });
 
   it.each(["", " ", "abc", "1..2", "3kg", "5°", "1/0", "--2", "2+", "1e3"])("%j is invalid", (text) => {
-    expect(amount(text, 0, "mm")).toBeNull();
+    expect(parseAmount(text, 0, "mm")).toBeNull();
   });
 
   it("is shown without trailing zeros", () => {
-    expect(show(0.0125, "mm")).toBe("12.5");
-    expect(show(-0, "mm")).toBe("0");
-    expect(show(-1e-9, "mm")).toBe("0");
-    expect(show(0.1, "m")).toBe("0.1");
-    expect(show(100, "mm")).toBe("100000");
-    expect(show(Math.PI / 2, "°")).toBe("90");
+    expect(amountText(0.0125, "mm")).toBe("12.5");
+    expect(amountText(-0, "mm")).toBe("0");
+    expect(amountText(-1e-9, "mm")).toBe("0");
+    expect(amountText(0.1, "m")).toBe("0.1");
+    expect(amountText(100, "mm")).toBe("100000");
+    expect(amountText(Math.PI / 2, "°")).toBe("90");
     expect([stepWords(0.01, "length"), stepWords(0.0025, "length"), stepWords(DEGREE / 60, "angle")]).toEqual([
       "1 cm",
       "2.5 mm",

@@ -4,7 +4,7 @@ import { decimal, normalised } from "../formats";
 export type LengthUnit = "m" | "cm" | "mm" | "in";
 export type AngleUnit = "°" | "rad";
 export type Unit = LengthUnit | AngleUnit;
-export type Quantity = "length" | "angle";
+type Quantity = "length" | "angle";
 
 export const LENGTH_UNITS: readonly LengthUnit[] = ["mm", "cm", "m", "in"];
 export const ANGLE_UNITS: readonly AngleUnit[] = ["°", "rad"];
@@ -20,21 +20,22 @@ const ALIASES: Record<string, Unit> = { '"': "in", inch: "in", deg: "°", d: "°
 const MINUTE = "′";
 const SECOND = "″";
 
-export function show(value: number, unit: Unit): string {
+/** Return a length or angle, m or rad, as a number in a unit. */
+export function amountText(value: number, unit: Unit): string {
   return decimal(value / UNIT_FACTORS[unit], DIGITS[unit]);
 }
 
 /**
- * Read a typed amount: `12.5`, `3cm`, `1in/2`, `10 + 2.5mm`. With a sign (`+12.5`, `-=3mm`), or if `by` is set, it is
- * added to the present value. Return null if it is invalid.
+ * Read a typed amount: `12.5`, `3cm`, `1in/2`, `10 + 2.5mm`. With a sign (`+12.5`, `-=3mm`), or if `relative` is set,
+ * it is added to the present value. Return null if it is invalid.
  */
-export function amount(text: string, now: number, unit: Unit, by = false): number | null {
+export function parseAmount(text: string, current: number, unit: Unit, relative = false): number | null {
   const clean = normalised(text);
   const change = /^(\+=?|-=)/.exec(clean);
   const value = sum(change ? clean.slice(change[0].length) : clean, unit);
   if (value === null) return null;
-  if (change) return now + (change[0] === "-=" ? -value : value);
-  return by ? now + value : value;
+  if (change) return current + (change[0] === "-=" ? -value : value);
+  return relative ? current + value : value;
 }
 
 /** A sum of terms, each with its own unit or the current one. */
@@ -54,16 +55,16 @@ function term(text: string, unit: Unit): number | null {
   const parts = /^([+-]?)\s*(\d+\.?\d*|\.\d+)\s*([a-z"°′″']*)\s*(?:([*/])\s*(\d+\.?\d*|\.\d+))?\s*$/i.exec(text.trim());
   if (!parts) return null;
   const [, sign, number, named, operator, by] = parts;
-  const worth = worthOf(named ?? "", unit);
-  if (worth === null) return null;
-  let value = Number(number) * worth * (sign === "-" ? -1 : 1);
+  const factor = unitFactor(named ?? "", unit);
+  if (factor === null) return null;
+  let value = Number(number) * factor * (sign === "-" ? -1 : 1);
   if (operator === "*") value *= Number(by);
   if (operator === "/") value /= Number(by);
   return Number.isFinite(value) ? value : null;
 }
 
 /** Return the value of a typed unit; null if it is unknown or of another quantity. */
-function worthOf(named: string, unit: Unit): number | null {
+function unitFactor(named: string, unit: Unit): number | null {
   if (!named) return UNIT_FACTORS[unit];
   const angle = isAngle(unit);
   if (angle && (named === MINUTE || named === "'")) return UNIT_FACTORS["°"] / 60;
@@ -97,5 +98,5 @@ export function stepWords(step: number, quantity: Quantity): string {
   const steps = quantity === "length" ? LENGTH_STEPS : ANGLE_STEPS;
   const known = steps.find(([value]) => Math.abs(value - step) < 1e-12);
   if (known) return `${decimal(known[1])}${known[2]}`;
-  return quantity === "length" ? `${show(step, "mm")} mm` : `${show(step, "°")}°`;
+  return quantity === "length" ? `${amountText(step, "mm")} mm` : `${amountText(step, "°")}°`;
 }

@@ -14,7 +14,7 @@ export const unit = (axis: Axis): Position => ({
   y: axis === "y" ? 1 : 0,
   z: axis === "z" ? 1 : 0,
 });
-export const scaled = ({ x, y, z }: Position, by: number): Position => ({ x: x * by, y: y * by, z: z * by });
+const scaled = ({ x, y, z }: Position, by: number): Position => ({ x: x * by, y: y * by, z: z * by });
 export const minus = (a: Position, b: Position): Position => plus(a, scaled(b, -1));
 export const dot = (a: Position, b: Position): number => a.x * b.x + a.y * b.y + a.z * b.z;
 

@@ -63,7 +63,7 @@ export function targetOf(state: State, selection: Selection | null): Target | nu
 }
 
 /** Return whether a type was created as a shape or mesh, not for a device. */
-export function isShapeAlone(state: State, type: string): boolean {
+function isShapeAlone(state: State, type: string): boolean {
   for (let name: string | undefined = type, left = 10; name && left > 0; left--) {
     if (name === "CollisionObject" || name === "VirtualCollisionObject") return true;
     name = state.types.byName[name]?.base;

@@ -26,7 +26,7 @@ export interface ToolSettings {
 /** Key in the general view state of the user. */
 export const TOOL = "transform";
 
-export const DEFAULTS: ToolSettings = {
+const DEFAULTS: ToolSettings = {
   length: "mm",
   angle: "°",
   lengthStep: 0.01,

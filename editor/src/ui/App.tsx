@@ -4,9 +4,9 @@ import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
 import { useLanguage } from "../i18n/catalogue";
 import { ROLES } from "../protocol/types";
-import { rememberPerson } from "../session/localStorage";
+import { rememberUser } from "../session/localStorage";
 import { isLive, isRunning, openId } from "../store/selectors";
-import { now, useEditor } from "../store/store";
+import { getState, useEditor } from "../store/store";
 import { LostConnection } from "./connection/LostConnection";
 import { Dock } from "./dock/Dock";
 import { StopMotion } from "./dock/StopMotion";
@@ -63,16 +63,16 @@ export function App() {
   }, [document]);
   useEffect(() => {
     if (status !== "ready") return;
-    const { user, role } = now().connection;
-    rememberPerson(user);
+    const { user, role } = getState().connection;
+    rememberUser(user);
     // Operators see their screen first; a hash shows that they have chosen one.
     if (role === ROLES.operator && !location.href.includes("#")) location.hash = "#/operator";
   }, [status]);
   // A lost connection does not bring users back to the join screen.
-  const [been, setBeen] = useState(false);
-  if (status === "ready" && !been) setBeen(true);
-  if ((status === "left" || status === "refused" || status === "person") && been) setBeen(false);
-  if (!been) {
+  const [wasReady, setWasReady] = useState(false);
+  if (status === "ready" && !wasReady) setWasReady(true);
+  if ((status === "left" || status === "refused" || status === "person") && wasReady) setWasReady(false);
+  if (!wasReady) {
     // Without a name there is only a token, and the server decides whether users enter a name or log on with a PIN.
     const authenticating = (status === "connecting" || status === "joining") && !user && !shared && !reason;
     return (

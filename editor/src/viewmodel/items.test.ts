@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
-import { opened } from "../store/document";
+import { documentFrom } from "../store/document";
 import { initialState, type State } from "../store/state";
 import { ItemMaker, plain } from "./items";
-import { borders } from "./program";
+import { terminalPlaces } from "./program";
 import { rollPitchYaw } from "./rotations";
 import { shapeOf } from "./shapes";
 
@@ -16,7 +16,7 @@ function workplace(): State {
     Box: { type: "Box", object_model: { type: "Box", box: { id: "Box", size_x: 1, size_y: 2, size_z: 3 } } } as never,
   };
   state.types.robots = { UR5e: { type: "UR5e", urdf_package_filename: "ur5e.zip" } as never };
-  state.doc = opened(
+  state.doc = documentFrom(
     {
       id: "scn",
       name: "cell",
@@ -172,7 +172,7 @@ test("the actions of a point are a stack until one of them is selected, and the 
 test("Start and End are near their actions, and clear of bodies, points and each other", () => {
   const { doc, types } = workplace();
   if (!doc) throw new Error();
-  const { START, END } = borders(doc, types);
+  const { START, END } = terminalPlaces(doc, types);
   const apart = (a: { x: number; y: number }, b: { x: number; y: number }) => Math.hypot(a.x - b.x, a.y - b.y);
   const point = { x: 1, y: 0 };
   expect(apart(START, END)).toBeGreaterThan(0.15);
@@ -182,5 +182,5 @@ test("Start and End are near their actions, and clear of bodies, points and each
   }
   // Without a body in the way they are next to the action.
   const alone = { ...doc, objects: {}, points: { acp: { ...doc.points.acp, parent: undefined } as never } };
-  expect(apart(borders(alone, types).START, POSE.position)).toBeLessThan(0.25);
+  expect(apart(terminalPlaces(alone, types).START, POSE.position)).toBeLessThan(0.25);
 });

@@ -14,7 +14,7 @@ import { isRunning } from "../store/selectors";
 import type { OpenDocument, State } from "../store/state";
 import type { Draft, Ghost } from "../store/ui";
 import { gripperOf, partsOn, placeOf, toolOf } from "./devices";
-import { borders, isDim, isOpen } from "./program";
+import { isDim, isOpen, terminalPlaces } from "./program";
 import { shapeOf } from "./shapes";
 import { faintness } from "./visibility";
 
@@ -27,7 +27,7 @@ const UPRIGHT = { position: NO_PLACE, orientation: { x: 0, y: 0, z: 0, w: 1 } };
 /** Create the items of successive states. */
 export class ItemMaker {
   private known = new Map<string, { inputs: unknown[]; item: Item }>();
-  private bordersOf: { inputs: unknown[]; places: ReturnType<typeof borders> } | null = null;
+  private terminalsOf: { inputs: unknown[]; places: ReturnType<typeof terminalPlaces> } | null = null;
 
   items(state: State): Item[] {
     const { doc } = state;
@@ -57,7 +57,7 @@ export class ItemMaker {
       lockedBy: lockedBy(state, id, me),
       faint: faint(id),
     });
-    const notify = (id: string) => [isSelected(id), lockedBy(state, id, me), faint(id)];
+    const commonInputs = (id: string) => [isSelected(id), lockedBy(state, id, me), faint(id)];
 
     const axes = state.view.user.hide_axes !== true;
     for (const object of Object.values(doc.objects)) {
@@ -76,7 +76,7 @@ export class ItemMaker {
       const parts = partsOn(state, object.id);
       const detected = parts?.map(({ sensor, seen }) => sensor + seen).join();
       const looks = [type, robot, fault, robot && online, model, ghost, robot && axes, detected, ...live];
-      add(object.id, [object, place, preview, ...looks, ...notify(object.id)], () => {
+      add(object.id, [object, place, preview, ...looks, ...commonInputs(object.id)], () => {
         const pose = {
           position: preview?.position ?? place?.position ?? NO_PLACE,
           orientation: preview?.orientation ?? place?.orientation ?? UPRIGHT.orientation,
@@ -102,7 +102,7 @@ export class ItemMaker {
       const preview = (drafted(draft, point) ?? state.previews[point.id])?.position;
       const breakpoint = point.id in state.breakpoints;
       const tied = point.parent !== undefined && (lines || selection?.id === point.id);
-      add(point.id, [point, size, preview, breakpoint, tied, ...notify(point.id)], () => ({
+      add(point.id, [point, size, preview, breakpoint, tied, ...commonInputs(point.id)], () => ({
         ...common(point.id, point.name),
         kind: "point",
         size,
@@ -115,7 +115,7 @@ export class ItemMaker {
     const reach = bestReach(state);
     for (const one of Object.values(doc.orientations)) {
       const preview = (drafted(draft, one) ?? state.previews[one.id])?.orientation;
-      add(one.id, [one, preview, reach[one.id], ...notify(one.id)], () => ({
+      add(one.id, [one, preview, reach[one.id], ...commonInputs(one.id)], () => ({
         ...common(one.id, one.name),
         kind: "orientation",
         parent: one.pointId,
@@ -123,7 +123,7 @@ export class ItemMaker {
         reach: reach[one.id] ?? "",
       }));
     }
-    this.pucks(state, doc, add, common, notify);
+    this.pucks(state, doc, add, common, commonInputs);
     if (state.view.user.hide_steps === true && state.ui.connecting === null) return found;
     const open = isOpen(state);
     const dim = isDim(state);
@@ -135,7 +135,7 @@ export class ItemMaker {
       const pale = dim(item.id);
       const taken = item.id === exit;
       const compared = hasComparisons(item) ? whenWords(doc, state.types, whenOf(item)) : "";
-      add(item.id, [item, inside, pale, taken, compared, ...notify(item.id)], () => ({
+      add(item.id, [item, inside, pale, taken, compared, ...commonInputs(item.id)], () => ({
         ...link(item, compared, common(item.id, "")),
         inside,
         dim: pale && !taken,
@@ -153,7 +153,7 @@ export class ItemMaker {
       id: string,
       name: string,
     ) => Omit<Item, "kind"> & { id: string; name: string; selected: boolean; lockedBy: string; faint: number },
-    notify: (id: string) => unknown[],
+    commonInputs: (id: string) => unknown[],
   ): void {
     const opened = isOpen(state);
     const dim = isDim(state);
@@ -177,7 +177,20 @@ export class ItemMaker {
       const called = calledBy(doc, action);
       add(
         action.id,
-        [action, called, level, count, open, pale, running, breakpoint, colour, place, reach, ...notify(action.id)],
+        [
+          action,
+          called,
+          level,
+          count,
+          open,
+          pale,
+          running,
+          breakpoint,
+          colour,
+          place,
+          reach,
+          ...commonInputs(action.id),
+        ],
         () => ({
           ...common(action.id, action.name),
           kind: "action",
@@ -195,14 +208,14 @@ export class ItemMaker {
       );
     }
     if (!doc.project?.has_logic) return;
-    const places = this.borders(state, doc);
+    const places = this.terminals(state, doc);
     for (const [id, role] of [
       [START, "start"],
       [END, "end"],
     ] as const) {
       const place = state.view.shared[placeKey(doc, id)];
       const pale = dim(id);
-      add(id, [place, places, pale, ...notify(id)], () => ({
+      add(id, [place, places, pale, ...commonInputs(id)], () => ({
         ...common(id, role === "start" ? t`Start` : t`End`),
         kind: "action",
         position: isPosition(place) ? place : places[id],
@@ -219,11 +232,11 @@ export class ItemMaker {
     }
   }
 
-  private borders({ types }: State, doc: OpenDocument): ReturnType<typeof borders> {
+  private terminals({ types }: State, doc: OpenDocument): ReturnType<typeof terminalPlaces> {
     const inputs = [doc.objects, doc.points, doc.actions, doc.logic, types];
-    if (!this.bordersOf || this.bordersOf.inputs.some((each, n) => each !== inputs[n]))
-      this.bordersOf = { inputs, places: borders(doc, types) };
-    return this.bordersOf.places;
+    if (!this.terminalsOf || this.terminalsOf.inputs.some((each, n) => each !== inputs[n]))
+      this.terminalsOf = { inputs, places: terminalPlaces(doc, types) };
+    return this.terminalsOf.places;
   }
 }
 

@@ -71,7 +71,7 @@ function covers({ yaw, width, depth, radius, ...middle }: Taken, x: number, y: n
  * Return places of Start and End in the world: to the left of the first and to the right of the last action, or as
  * near as they are clear of bodies and points.
  */
-export function borders(doc: OpenDocument, types: State["types"]): Record<"START" | "END", Position> {
+export function terminalPlaces(doc: OpenDocument, types: State["types"]): Record<"START" | "END", Position> {
   const taken: Taken[] = [];
   for (const object of Object.values(doc.objects)) {
     const shape = shapeOf(types.byName[object.type]);

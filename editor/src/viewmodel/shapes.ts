@@ -4,7 +4,7 @@ import type { Shape } from "../engine/items";
 import type { ObjectTypeMeta } from "../protocol/types";
 
 /** Setting of conveyors, whose icon is that of all machines. */
-const OF_BELTS = "belt_speed";
+const BELT_SETTING = "belt_speed";
 
 export function shapeOf(type: Partial<ObjectTypeMeta> | undefined): Shape {
   const model = type?.object_model;
@@ -12,6 +12,6 @@ export function shapeOf(type: Partial<ObjectTypeMeta> | undefined): Shape {
   if (model?.cylinder) return { kind: "cylinder", radius: model.cylinder.radius, height: model.cylinder.height };
   if (model?.sphere) return { kind: "sphere", radius: model.sphere.radius };
   if (model?.mesh) return { kind: "mesh", asset: model.mesh.asset_id };
-  if (type?.settings?.some(({ name }) => name === OF_BELTS)) return { kind: "none", icon: "axis" };
+  if (type?.settings?.some(({ name }) => name === BELT_SETTING)) return { kind: "none", icon: "axis" };
   return type?.icon ? { kind: "none", icon: type.icon } : { kind: "none" };
 }

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { opened } from "../store/document";
+import { documentFrom } from "../store/document";
 import { initialState, type State } from "../store/state";
 import { allOf, counts, fitting, flat, narrowed, neighbour, thingsOf } from "./things";
 import { faintness } from "./visibility";
@@ -20,7 +20,7 @@ const point = (id: string, name: string, parent?: string, more: object = {}) => 
 function workplace(): State {
   const state = initialState();
   state.types.robots = { UR5e: { type: "UR5e" } as never };
-  state.doc = opened(
+  state.doc = documentFrom(
     {
       id: "scn",
       name: "cell",

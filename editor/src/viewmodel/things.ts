@@ -17,7 +17,7 @@ export interface Row {
   below: Row[];
 }
 
-export interface Things {
+interface Things {
   /** Items with a pose, with their children. */
   placed: Row[];
   /** Objects without a pose. */

@@ -1,7 +1,7 @@
 import { Quaternion, Ray, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import { alongAxis, angleBetween, onPlane, toSegment, unwound } from "./drags";
-import { apart, handlesOf, keyOf, outline } from "./handles";
+import { distanceToOutline, handlesOf, keyOf, outline } from "./handles";
 
 const HALF = { x: 1, y: 1, z: 1 };
 
@@ -52,17 +52,17 @@ describe("handles", () => {
   it("are hit by the distance to their line; of a ring, the front part precedes the rear one", () => {
     expect(toSegment(5, 3, { x: 0, y: 0 }, { x: 10, y: 0 })).toBe(3);
     expect(toSegment(13, 4, { x: 0, y: 0 }, { x: 10, y: 0 })).toBe(5);
-    const ring = outline({ do: "ring", axis: "z" }, HALF).map(({ x, y }) => ({
+    const ring = outline({ kind: "ring", axis: "z" }, HALF).map(({ x, y }) => ({
       x: x * 100,
       y: y * 20,
       depth: y > 0 ? 0.9 : 0.1,
     }));
     const centre = { x: 0, y: 0, depth: 0.5 };
-    expect(apart(0, -17, ring, centre)).toBeLessThan(1);
-    expect(apart(0, 17, ring, centre)).toBeGreaterThan(7);
+    expect(distanceToOutline(0, -17, ring, centre)).toBeLessThan(1);
+    expect(distanceToOutline(0, 17, ring, centre)).toBeGreaterThan(7);
   });
 
   it("behind the camera cannot be hit", () => {
-    expect(apart(0, 0, [{ x: 0, y: 0, depth: 1.2 }], { x: 0, y: 0, depth: 1.2 })).toBe(Infinity);
+    expect(distanceToOutline(0, 0, [{ x: 0, y: 0, depth: 1.2 }], { x: 0, y: 0, depth: 1.2 })).toBe(Infinity);
   });
 });

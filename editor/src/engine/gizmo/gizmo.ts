@@ -9,7 +9,7 @@ import { alongAxis, angleBetween, onPlane, unwound } from "./drags";
 import {
   AXES,
   type Axis,
-  apart,
+  distanceToOutline,
   type GizmoMode,
   type Handle,
   handlesOf,
@@ -121,7 +121,7 @@ export class Gizmo {
     return Object.fromEntries(
       handlesOf(setup.mode, setup.allowed ?? AXES).map((handle) => {
         const line = this.line(handle);
-        const { x, y } = line[handle.do === "ring" ? 6 : line.length - 1] ?? { x: 0, y: 0 };
+        const { x, y } = line[handle.kind === "ring" ? 6 : line.length - 1] ?? { x: 0, y: 0 };
         return [keyOf(handle), { x, y }];
       }),
     );
@@ -182,8 +182,8 @@ export class Gizmo {
 
   /** Return whether an arrow or knob points at the camera and cannot be dragged. */
   private isShort(handle: Handle): boolean {
-    if (handle.do !== "axis" && handle.do !== "face") return false;
-    const line = this.line({ do: "axis", axis: handle.axis });
+    if (handle.kind !== "axis" && handle.kind !== "face") return false;
+    const line = this.line({ kind: "axis", axis: handle.axis });
     const [a, b] = line;
     return !a || !b || Math.hypot(a.x - b.x, a.y - b.y) < SHORT;
   }
@@ -197,7 +197,7 @@ export class Gizmo {
     let least = near;
     for (const handle of handlesOf(setup.mode, setup.allowed ?? AXES)) {
       if (this.isShort(handle)) continue;
-      const distance = apart(x, y, this.line(handle), centre);
+      const distance = distanceToOutline(x, y, this.line(handle), centre);
       if (distance >= least) continue;
       best = handle;
       least = distance;
@@ -220,12 +220,12 @@ export class Gizmo {
     this.around.canvas.setPointerCapture(event.pointerId);
     const origin = this.origin();
     const towards = new Vector3(0, 0, 1).applyQuaternion(this.around.camera().getWorldQuaternion(new Quaternion()));
-    const axis = handle.do === "free" ? towards : UNIT[handle.axis].clone().applyQuaternion(this.turned());
-    if (handle.do === "face") axis.multiplyScalar(handle.sign);
+    const axis = handle.kind === "free" ? towards : UNIT[handle.axis].clone().applyQuaternion(this.turned());
+    if (handle.kind === "face") axis.multiplyScalar(handle.sign);
     const last: Drag = { phase: "start", handle, translation: new Vector3(), length: 0, angle: 0, axis, x, y };
     const from = this.reach(handle, x, y, origin, axis) ?? origin.clone();
     this.dragging = { handle, pointer: event.pointerId, from, origin, axis, last };
-    this.light(keyOf(handle));
+    this.highlight(keyOf(handle));
     this.onDrag(last);
   }
 
@@ -234,7 +234,7 @@ export class Gizmo {
     const { width, height } = this.around.size();
     this.caster.setFromCamera(new Vector2((x / width) * 2 - 1, 1 - (y / height) * 2), this.around.camera());
     const { ray } = this.caster;
-    if (handle.do !== "axis" && handle.do !== "face") return onPlane(ray, origin, axis);
+    if (handle.kind !== "axis" && handle.kind !== "face") return onPlane(ray, origin, axis);
     const along = alongAxis(ray, origin, axis);
     return along === null ? null : origin.clone().addScaledVector(axis, along);
   }
@@ -245,7 +245,7 @@ export class Gizmo {
     if (!dragging) {
       if (this.setup && event.pointerType === "mouse" && !event.buttons) {
         const handle = this.at(x, y, NEAR_MOUSE);
-        this.light(handle ? keyOf(handle) : "");
+        this.highlight(handle ? keyOf(handle) : "");
       }
       return;
     }
@@ -255,7 +255,7 @@ export class Gizmo {
     const to = this.reach(handle, x, y, origin, axis);
     if (!to) return; // the pointer is above the horizon: keep the last position
     const translation = new Vector3().subVectors(to, from);
-    const ring = handle.do === "ring";
+    const ring = handle.kind === "ring";
     const angle = ring ? unwound(angleBetween(from.clone().sub(origin), to.clone().sub(origin), axis), last.angle) : 0;
     dragging.last = {
       phase: "move",
@@ -289,15 +289,15 @@ export class Gizmo {
     this.dragging = null;
     const { canvas } = this.around;
     if (canvas.hasPointerCapture(dragging.pointer)) canvas.releasePointerCapture(dragging.pointer);
-    this.light("");
+    this.highlight("");
     this.onDrag({ ...dragging.last, phase });
     this.around.draw();
   }
 
-  private light(key: string): void {
+  private highlight(key: string): void {
     if (key === this.lit) return;
     this.lit = key;
-    this.picture.light(key);
+    this.picture.highlight(key);
     this.around.canvas.style.cursor = key ? "grab" : "";
     this.around.draw();
   }

@@ -10,22 +10,22 @@ export const AXES: readonly Axis[] = ["x", "y", "z"];
 
 export type Handle =
   /** Move along an axis, in a plane perpendicular to an axis, or freely. */
-  | { do: "axis"; axis: Axis }
-  | { do: "plane"; axis: Axis }
-  | { do: "free" }
+  | { kind: "axis"; axis: Axis }
+  | { kind: "plane"; axis: Axis }
+  | { kind: "free" }
   /** Turn about an axis. */
-  | { do: "ring"; axis: Axis }
+  | { kind: "ring"; axis: Axis }
   /** Drag a face: the one in the direction of an axis, or opposite to it. */
-  | { do: "face"; axis: Axis; sign: 1 | -1 };
+  | { kind: "face"; axis: Axis; sign: 1 | -1 };
 
 export type GizmoMode = "move" | "turn" | "size";
 
 export const keyOf = (handle: Handle): string =>
-  handle.do === "free"
+  handle.kind === "free"
     ? "free"
-    : handle.do === "face"
+    : handle.kind === "face"
       ? `face ${handle.sign > 0 ? "+" : "-"}${handle.axis}`
-      : `${handle.do} ${handle.axis}`;
+      : `${handle.kind} ${handle.axis}`;
 
 /** Proportions in lengths of the gizmo: start and end of a shaft, position of a square, radius of a ring. */
 export const SHAFT = [0.3, 1.05] as const;
@@ -39,39 +39,39 @@ export const UNIT: Record<Axis, Vector3> = {
 };
 
 export function handlesOf(mode: GizmoMode, allowed: readonly Axis[]): Handle[] {
-  if (mode === "turn") return allowed.map((axis) => ({ do: "ring", axis }));
+  if (mode === "turn") return allowed.map((axis) => ({ kind: "ring", axis }));
   if (mode === "size") {
-    return allowed.flatMap((axis) => ([1, -1] as const).map((sign): Handle => ({ do: "face", axis, sign })));
+    return allowed.flatMap((axis) => ([1, -1] as const).map((sign): Handle => ({ kind: "face", axis, sign })));
   }
   return [
-    { do: "free" },
-    ...allowed.map((axis): Handle => ({ do: "axis", axis })),
-    ...allowed.map((axis): Handle => ({ do: "plane", axis })),
+    { kind: "free" },
+    ...allowed.map((axis): Handle => ({ kind: "axis", axis })),
+    ...allowed.map((axis): Handle => ({ kind: "plane", axis })),
   ];
 }
 
 /** Return two axes perpendicular to one, in right-handed order. */
-export function square(axis: Axis): [Vector3, Vector3] {
+export function perpendicular(axis: Axis): [Vector3, Vector3] {
   const at = AXES.indexOf(axis);
   return [UNIT[AXES[(at + 1) % 3] ?? "x"], UNIT[AXES[(at + 2) % 3] ?? "x"]];
 }
 
 /** Return the line by which a handle is hit, in lengths of the gizmo and its frame; a point for small handles. */
 export function outline(handle: Handle, half: Record<Axis, number>): Vector3[] {
-  switch (handle.do) {
+  switch (handle.kind) {
     case "free":
       return [new Vector3()];
     case "axis":
       return SHAFT.map((at) => UNIT[handle.axis].clone().multiplyScalar(at));
     case "plane": {
-      const [a, b] = square(handle.axis);
+      const [a, b] = perpendicular(handle.axis);
       const middle = (SQUARE[0] + SQUARE[1]) / 2;
       return [a.clone().multiplyScalar(middle).addScaledVector(b, middle)];
     }
     case "face":
       return [UNIT[handle.axis].clone().multiplyScalar(handle.sign * half[handle.axis])];
     case "ring": {
-      const [a, b] = square(handle.axis);
+      const [a, b] = perpendicular(handle.axis);
       return Array.from({ length: 49 }, (_, n) => {
         const angle = (n / 48) * 2 * Math.PI;
         return a
@@ -83,7 +83,7 @@ export function outline(handle: Handle, half: Record<Axis, number>): Vector3[] {
   }
 }
 
-export interface OnScreen {
+interface OnScreen {
   x: number;
   y: number;
   /** Depth in normalised device coordinates; larger is farther. */
@@ -96,7 +96,7 @@ export function onScreen(point: Vector3, camera: Camera, width: number, height: 
 }
 
 /** Return the distance of a pointer from a handle's outline on the screen, px; a bit more for its rear half. */
-export function apart(x: number, y: number, line: OnScreen[], centre: OnScreen): number {
+export function distanceToOutline(x: number, y: number, line: OnScreen[], centre: OnScreen): number {
   const [first] = line;
   if (!first || line.some((each) => each.depth > 1)) return Infinity;
   if (line.length === 1) return Math.hypot(x - first.x, y - first.y);

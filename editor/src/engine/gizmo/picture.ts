@@ -23,7 +23,7 @@ import {
   type Vector3,
 } from "three";
 import { disposeTree } from "../thing";
-import { type Axis, type Handle, keyOf, RING, SHAFT, SQUARE, square, UNIT } from "./handles";
+import { type Axis, type Handle, keyOf, perpendicular, RING, SHAFT, SQUARE, UNIT } from "./handles";
 
 const COLOURS: Record<Axis, Color> = { x: new Color(0xd8342b), y: new Color(0x2a9d3f), z: new Color(0x2f6fe0) };
 const PLAIN = new Color(0x8a8f98);
@@ -58,7 +58,7 @@ export class Picture {
     for (const handle of handles) {
       const key = keyOf(handle);
       if (this.parts.has(key)) continue;
-      const color = handle.do === "free" ? PLAIN : COLOURS[handle.axis];
+      const color = handle.kind === "free" ? PLAIN : COLOURS[handle.axis];
       const material = new MeshBasicMaterial({
         color,
         depthTest: false,
@@ -66,7 +66,7 @@ export class Picture {
         opacity: 0.95,
         side: DoubleSide,
       });
-      if (handle.do === "plane") material.opacity = 0.55;
+      if (handle.kind === "plane") material.opacity = 0.55;
       const group = shape(handle, material, (axis) => this.letter(axis));
       group.traverse((each) => {
         each.renderOrder = ABOVE_ALL;
@@ -77,7 +77,7 @@ export class Picture {
     this.root.visible = handles.length > 0;
   }
 
-  light(key: string): void {
+  highlight(key: string): void {
     for (const [each, { material, color }] of this.parts) material.color.copy(each === key ? LIT : color);
   }
 
@@ -93,7 +93,8 @@ export class Picture {
     this.root.scale.setScalar(scale);
     for (const { handle, group } of this.parts.values()) {
       group.visible = !short(handle);
-      if (handle.do === "face") group.position.copy(UNIT[handle.axis]).multiplyScalar(handle.sign * half[handle.axis]);
+      if (handle.kind === "face")
+        group.position.copy(UNIT[handle.axis]).multiplyScalar(handle.sign * half[handle.axis]);
     }
     this.root.updateMatrixWorld();
   }
@@ -116,7 +117,7 @@ export class Picture {
 function shape(handle: Handle, material: MeshBasicMaterial, letterOf: (axis: Axis) => CanvasTexture): Group {
   const group = new Group();
   const add = (geometry: BufferGeometry) => group.add(new Mesh(geometry, material));
-  switch (handle.do) {
+  switch (handle.kind) {
     case "free":
       add(new SphereGeometry(0.09, 16, 12));
       break;
@@ -137,14 +138,14 @@ function shape(handle: Handle, material: MeshBasicMaterial, letterOf: (axis: Axi
     }
     case "plane": {
       const [from, to] = SQUARE;
-      const [a, b] = square(handle.axis);
+      const [a, b] = perpendicular(handle.axis);
       const middle = (from + to) / 2;
       const basis = new Matrix4().makeBasis(a, b, UNIT[handle.axis]);
       add(new PlaneGeometry(to - from, to - from).translate(middle, middle, 0).applyMatrix4(basis));
       break;
     }
     case "ring": {
-      const [a, b] = square(handle.axis);
+      const [a, b] = perpendicular(handle.axis);
       add(new TorusGeometry(RING, 0.022, 8, 64).applyMatrix4(new Matrix4().makeBasis(a, b, UNIT[handle.axis])));
       break;
     }

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { BufferAttribute, BufferGeometry } from "three";
 
 /** Extras of a robot: its URDF, the meshes of its files, and the reasons for missing ones. */
-export interface RobotExtras {
+interface RobotExtras {
   urdf: string;
   meshes: Record<string, string>;
   problems: Record<string, string>;

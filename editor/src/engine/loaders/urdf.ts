@@ -3,16 +3,16 @@
 import { t } from "@lingui/core/macro";
 import { LoadingManager, type Material, Mesh, type Object3D } from "three";
 import URDFLoader, { type URDFLink, type URDFRobot, type URDFVisual } from "urdf-loader";
-import { axesOf, dressed } from "../dress";
+import { axesOf, linkGeometry } from "../dress";
 import { readGlb } from "./glb";
 
 /** Materials: for coloured surfaces, and for all others. */
-export interface RobotMaterials {
+interface RobotMaterials {
   plain: Material;
   coloured: Material;
 }
 
-export interface LoadedRobot {
+interface LoadedRobot {
   robot: URDFRobot;
   /** The reasons why meshes are missing, one sentence each. */
   problems: string[];
@@ -52,7 +52,7 @@ function joinShapes(link: URDFLink): void {
     if ((each as Partial<URDFVisual>).isURDFVisual) each.traverse((one) => void (isShape(one) && pieces.push(one)));
   if (pieces.length === 0) return;
   const shapes = pieces.map((mesh) => ({ mesh, matrix: base.clone().multiply(mesh.matrixWorld) }));
-  const geometry = dressed(shapes, axesOf(link));
+  const geometry = linkGeometry(shapes, axesOf(link));
   for (const piece of pieces) piece.removeFromParent();
   link.add(new Mesh(geometry));
 }

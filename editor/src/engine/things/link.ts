@@ -27,7 +27,7 @@ const DASHED = 2;
 const PALE = 0.75;
 const DIM = 0.25;
 /** Layer of what is picked but drawn by `LinkLines`. */
-export const PICKED = 1;
+const PICKED = 1;
 /** Lengths of dashes, each followed by its gap, m; null: solid. */
 const DASHES: Record<LinkItem["branch"], number[] | null> = {
   always: null,
@@ -103,7 +103,7 @@ export class LinkThing extends Thing<LinkItem> {
     const drawn = [...this.from.toArray(), ...this.to.toArray()].map((one) => one.toFixed(4)).join() + this.item.branch;
     if (drawn !== this.drawn) {
       this.drawn = drawn;
-      this.bow();
+      this.buildArc();
       this.label?.position.copy(this.middle);
     }
     this.context.batches.links.set(this.item.id, this.arrow, this.color);
@@ -144,7 +144,7 @@ export class LinkThing extends Thing<LinkItem> {
     }
   }
 
-  private bow(): void {
+  private buildArc(): void {
     const { from, to } = this;
     const length = Math.max(1e-3, from.distanceTo(to));
     const top = new Vector3().addVectors(from, to).multiplyScalar(0.5);
@@ -155,11 +155,11 @@ export class LinkThing extends Thing<LinkItem> {
     }
     // A quadratic curve and its directions.
     const place = (t: number) => new Vector3().lerpVectors(from, top, t).lerp(new Vector3().lerpVectors(top, to, t), t);
-    const way = (t: number) =>
+    const direction = (t: number) =>
       new Vector3().subVectors(top, from).lerp(new Vector3().subVectors(to, top), t).normalize();
     const strip = (start: number, end: number, sections: number): Strip => {
       const at = [...Array(sections + 1).keys()].map((n) => start + ((end - start) * n) / sections);
-      return { places: at.map(place), ways: at.map(way) };
+      return { places: at.map(place), directions: at.map(direction) };
     };
     this.middle.copy(place(0.5));
     const strips: Strip[] = [];
@@ -175,7 +175,7 @@ export class LinkThing extends Thing<LinkItem> {
         at += on + off;
       }
     }
-    this.arrow = { strips, head: [place(HEAD), way(HEAD)] };
+    this.arrow = { strips, head: [place(HEAD), direction(HEAD)] };
     this.line.geometry.dispose();
     this.line.geometry = new BufferGeometry().setFromPoints(strips.flatMap(({ places }) => places));
   }

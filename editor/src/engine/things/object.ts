@@ -21,7 +21,7 @@ import type { DeviceModel } from "../models";
 import type { Parts } from "../parts";
 import { setPose } from "../poses";
 import { surface } from "../surface";
-import { type Context, disposeTree, ownedBy, seenThrough, Thing } from "../thing";
+import { type Context, disposeTree, ownedBy, setTransparent, Thing } from "../thing";
 
 /** Colour of detected parts. */
 const PART = 0x2f8f5b;
@@ -70,7 +70,7 @@ export class ObjectThing extends Thing<ObjectItem> {
     if (color || !this.coloured) this.material.color.copy(color ?? palette.object);
     else this.material.color.setRGB(1, 1, 1);
     this.edges.color.copy(item.selected ? palette.selected : palette.gridStrong);
-    seenThrough(this.material, item.faint > 0);
+    setTransparent(this.material, item.faint > 0);
     this.material.opacity = 1 - item.faint;
     this.material.depthWrite = item.faint < 0.5;
     this.root.visible = item.faint < 1;

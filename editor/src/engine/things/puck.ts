@@ -25,7 +25,7 @@ import { type Context, Thing } from "../thing";
 
 /** Radius of a puck, of START and END, height of the first one above its point, and distance between pucks, m. */
 const RADIUS = 0.018;
-const BORDER = 0.03;
+const TERMINAL = 0.03;
 /** Radius of the lower edge of a call, whose puck is a square, m. */
 const CALL = 0.026;
 const FIRST = 0.035;
@@ -72,7 +72,7 @@ export class PuckThing extends Thing<PuckItem> {
   private grown = 1;
   private readonly pale = new Color();
   private signs: Batch | null = null;
-  private readonly above: Instance;
+  private readonly signInstance: Instance;
 
   constructor(item: PuckItem, context: Context) {
     super(context);
@@ -86,7 +86,7 @@ export class PuckThing extends Thing<PuckItem> {
           ? new CylinderGeometry(RADIUS, RADIUS, THICK, context.quality === "low" ? 12 : 24)
           : role === "call"
             ? new CylinderGeometry(RADIUS, CALL, THICK, 4).rotateY(Math.PI / 4)
-            : new CylinderGeometry(BORDER, BORDER, 0.014, 6)
+            : new CylinderGeometry(TERMINAL, TERMINAL, 0.014, 6)
         ).rotateX(Math.PI / 2),
         new MeshLambertMaterial(),
       ],
@@ -95,7 +95,7 @@ export class PuckThing extends Thing<PuckItem> {
     );
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
     this.batch.add(this.instance);
-    this.above = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
+    this.signInstance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
   }
 
   update(item: PuckItem): void {
@@ -132,10 +132,10 @@ export class PuckThing extends Thing<PuckItem> {
       make && (this.item.open || this.item.count === 1)
         ? this.context.batches.of(`puck ${reach}`, () => [make(), new MeshLambertMaterial()])
         : null;
-    if (reach) this.above.color = this.context.palette.reach[reach];
+    if (reach) this.signInstance.color = this.context.palette.reach[reach];
     if (signs === this.signs) return;
-    this.signs?.remove(this.above);
-    signs?.add(this.above);
+    this.signs?.remove(this.signInstance);
+    signs?.add(this.signInstance);
     this.signs = signs;
   }
 
@@ -143,13 +143,13 @@ export class PuckThing extends Thing<PuckItem> {
     const { faint, selected, running } = this.item;
     const size = faint >= 1 ? 0 : this.grown * (selected || running ? 1.25 : 1);
     this.instance.offset.makeScale(size, size, size);
-    this.above.offset.makeScale(size, size, size).setPosition(0, 0, SIGN * size);
+    this.signInstance.offset.makeScale(size, size, size).setPosition(0, 0, SIGN * size);
   }
 
   override resized(): boolean {
     const { role } = this.item;
-    const border = role === "start" || role === "end";
-    const wanted = (LEAST * this.context.metresPerPixel(this.anchor(up))) / (border ? BORDER : RADIUS);
+    const terminal = role === "start" || role === "end";
+    const wanted = (LEAST * this.context.metresPerPixel(this.anchor(up))) / (terminal ? TERMINAL : RADIUS);
     const grown = Math.min(MOST, Math.max(1, 2 ** (Math.ceil(Math.log2(wanted) * 2) / 2)));
     if (grown === this.grown) return false;
     this.grown = grown;
@@ -195,7 +195,7 @@ export class PuckThing extends Thing<PuckItem> {
 
   override dispose(): void {
     this.batch.remove(this.instance);
-    this.signs?.remove(this.above);
+    this.signs?.remove(this.signInstance);
     this.root.removeFromParent();
   }
 }

@@ -17,7 +17,7 @@ import { STALE, STILL } from "../../store/telemetry";
 import type { RobotItem } from "../items";
 import { setPose } from "../poses";
 import { surface } from "../surface";
-import { type Context, disposeTree, ownedBy, seenThrough, Thing } from "../thing";
+import { type Context, disposeTree, ownedBy, setTransparent, Thing } from "../thing";
 import { GhostRobot } from "./ghost";
 import type { ToolModel } from "./tool";
 
@@ -34,7 +34,7 @@ const GREY = 0.72;
 const inverse = new Matrix4();
 const tip = new Vector3();
 const tipPose = new Matrix4();
-const whole = new Vector3(1, 1, 1);
+const UNIT_SCALE = new Vector3(1, 1, 1);
 
 export class RobotThing extends Thing<RobotItem> {
   readonly root = new Group();
@@ -50,7 +50,7 @@ export class RobotThing extends Thing<RobotItem> {
   private reason = "";
   private readonly ghost = new GhostRobot(this.root);
   private tool: ToolModel | null = null;
-  private arming = false;
+  private loadingTool = false;
   private urdf: string | null = null;
   private stale = false;
 
@@ -68,7 +68,7 @@ export class RobotThing extends Thing<RobotItem> {
       void this.load(item.urdf);
     }
     if (this.tool) this.tool.update(item);
-    else if ((item.tool || item.parts?.length) && !this.arming) void this.arm();
+    else if ((item.tool || item.parts?.length) && !this.loadingTool) void this.loadTool();
     this.root.visible = item.faint < 1;
     for (const frame of this.tips.values()) frame.visible = item.axes;
     this.ghost.show(item.ghost, this.robot, this.context.palette);
@@ -136,8 +136,8 @@ export class RobotThing extends Thing<RobotItem> {
     return this.tool?.step(seconds) ?? false;
   }
 
-  private async arm(): Promise<void> {
-    this.arming = true;
+  private async loadTool(): Promise<void> {
+    this.loadingTool = true;
     const { ToolModel } = await import("./tool");
     if (this.urdf === null) return; // removed meanwhile
     const { id } = this.item;
@@ -153,7 +153,7 @@ export class RobotThing extends Thing<RobotItem> {
     const flange = links.flange ?? links.tool0 ?? Object.values(links).at(-1);
     if (!first || !flange || !this.tool) return;
     const { x, y, z, w } = first.pose.orientation;
-    tipPose.compose(tip.copy(first.pose.position as Vector3), new Quaternion(x, y, z, w).normalize(), whole);
+    tipPose.compose(tip.copy(first.pose.position as Vector3), new Quaternion(x, y, z, w).normalize(), UNIT_SCALE);
     flange.updateWorldMatrix(true, false);
     this.tool?.mount(flange, tipPose);
   }
@@ -198,10 +198,10 @@ export class RobotThing extends Thing<RobotItem> {
     if (highlight) this.coloured.color.copy(highlight);
     else this.coloured.color.setRGB(1, 1, 1);
     // A robot whose joints are unknown is grey. It is not transparent, since its parts would show through each other.
-    const vague = this.stale || (this.robot !== null && this.shown.size === 0);
+    const unknownPose = this.stale || (this.robot !== null && this.shown.size === 0);
     for (const material of [this.material, this.coloured]) {
-      if (vague) material.color.multiplyScalar(GREY);
-      seenThrough(material, faint > 0);
+      if (unknownPose) material.color.multiplyScalar(GREY);
+      setTransparent(material, faint > 0);
       material.opacity = 1 - faint;
     }
   }

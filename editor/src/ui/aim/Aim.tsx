@@ -7,7 +7,7 @@ import { storeGeneralState } from "../../commands/viewstate";
 import { bearingOf } from "../../engine/bearing";
 import type { Engine } from "../../engine/engine";
 import { followCrosshair, nextCandidate } from "../../session/aiming";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { kindName, nameOf, selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import { isTyping } from "../search/overlay";
@@ -15,8 +15,8 @@ import { pick } from "../workplace/pick";
 
 const NOTHING = msg`Nothing at the crosshair. Turn the view.`;
 
-export function takeCandidate(): void {
-  const { chosen } = now().ui.crosshair;
+function selectCandidate(): void {
+  const { chosen } = getState().ui.crosshair;
   if (chosen) pick([chosen]);
 }
 
@@ -27,7 +27,7 @@ export function Aim({ engine }: { engine: Engine }) {
   useEffect(
     () =>
       followCrosshair(engine, () => {
-        const { chosen: at } = now().ui.crosshair;
+        const { chosen: at } = getState().ui.crosshair;
         const place = at ? bearingOf(engine, at) : null;
         if (!mark.current) return;
         mark.current.style.visibility = place?.inView ? "visible" : "hidden";
@@ -53,14 +53,14 @@ export function Aim({ engine }: { engine: Engine }) {
       if (event.key.toLowerCase() === "n") nextCandidate(event.shiftKey ? -1 : 1);
       // Enter belongs to the focused element, except for the view.
       else if (event.key === "Enter" && event.target instanceof Element && event.target.matches("body, .view canvas"))
-        takeCandidate();
+        selectCandidate();
       else return;
       event.preventDefault();
     };
     window.addEventListener("keydown", key);
     return () => window.removeEventListener("keydown", key);
   }, []);
-  const kind = selectionOf(now(), chosen)?.kind;
+  const kind = selectionOf(getState(), chosen)?.kind;
   const at = candidates.indexOf(chosen) + 1;
   return (
     <>
@@ -77,10 +77,10 @@ export function Aim({ engine }: { engine: Engine }) {
           )}
         </span>
         <Button
-          look="primary"
+          variant="primary"
           aria-label={name ? t`Select ${name}` : t`Select`}
           why={chosen ? "" : i18n._(NOTHING)}
-          onPress={takeCandidate}
+          onPress={selectCandidate}
         >
           {t`Select`}
         </Button>
@@ -97,7 +97,7 @@ export function Aim({ engine }: { engine: Engine }) {
         </Button>
         {!listed && (
           <Button
-            look="plain"
+            variant="plain"
             icon="close"
             aria-label={t`Close the crosshair`}
             onPress={() => storeGeneralState({ aiming: null })}

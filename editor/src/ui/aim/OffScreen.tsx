@@ -17,20 +17,20 @@ export function OffScreen({ engine }: { engine: Engine }) {
   const [away, setAway] = useState(false);
   const button = useRef<HTMLButtonElement>(null);
   useLayoutEffect(() => {
-    const look = () => {
+    const update = () => {
       const at = id ? bearingOf(engine, id) : null;
       const shown = at !== null && !at.inView;
       setAway(shown);
       const view = button.current?.closest(".view")?.getBoundingClientRect();
       if (!shown || !button.current || !view) return;
-      const { x, y, angle } = atEdge(at, view.width, view.height, taken(view));
+      const { x, y, angle } = atEdge(at, view.width, view.height, controlAreas(view));
       button.current.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px) translate(-50%, -50%)`;
       button.current.style.setProperty("--turned", `${Math.round(angle)}deg`);
     };
-    look();
-    const end = engine.watch(look);
+    update();
+    const end = engine.watch(update);
     // A new size is drawn some frames later: until then the arrow would be beyond the edge.
-    const resized = new ResizeObserver(look);
+    const resized = new ResizeObserver(update);
     const around = button.current?.closest(".view");
     if (around) resized.observe(around);
     return () => {
@@ -66,7 +66,7 @@ export function OffScreen({ engine }: { engine: Engine }) {
 }
 
 /** Return the areas of controls that nothing else may cover, pixels in the view; without the control `own`. */
-export function taken(view: DOMRect, own?: Element): Rect[] {
+export function controlAreas(view: DOMRect, own?: Element): Rect[] {
   return [...document.querySelectorAll(OTHERS)]
     .filter((each) => each !== own)
     .map((each) => each.getBoundingClientRect())

@@ -17,7 +17,7 @@ import { firstUp, timesOf } from "./useAlarms";
 import "./alarms.css";
 
 /** Return why the user cannot acknowledge an alarm; an empty string if they can. */
-export function whyNotAcknowledged(state: State, record: AlarmRecord): string {
+function whyNotAcknowledged(state: State, record: AlarmRecord): string {
   if (record.acknowledge === "technician" && state.connection.role < ROLES.technician)
     return t`Only a technician can acknowledge this alarm.`;
   return whyUnavailable(state, "AcknowledgeAlarm");

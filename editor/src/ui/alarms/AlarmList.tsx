@@ -11,7 +11,7 @@ import type { AlarmFrequency, AlarmRecord, AlarmStatisticsData, RecordingInfo } 
 import { call } from "../../session/connection";
 import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
-import { OneOf, Pick } from "../kit/fields";
+import { SelectField, ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { OpenRecording } from "../recording/OpenRecording";
 import { useRecordings } from "../recording/useRecordings";
@@ -35,7 +35,7 @@ export default function AlarmList() {
   ] as const;
   return (
     <div className="alarm-list">
-      <OneOf label={t`Show`} value={show} choices={choices} onChange={setShow} />
+      <ToggleGroup label={t`Show`} value={show} choices={choices} onChange={setShow} />
       {show === "worst" ? <Worst /> : <Records key={show} show={show} />}
     </div>
   );
@@ -53,7 +53,7 @@ function Records({ show }: { show: Show }) {
   return (
     <>
       {names.size > 1 && (
-        <Pick
+        <SelectField
           label={t`Device`}
           value={object}
           choices={[["", t`All devices`] as const, ...names]}
@@ -100,11 +100,11 @@ function Row({ record, recording }: RowProps) {
       <OpenRecording recording={recording} />
       {record.retain && !shelved && !record.acknowledged && <Acknowledge record={record} />}
       {shelved ? (
-        <Button look="plain" why={why} onPress={() => shelve(0)}>{t`Show again`}</Button>
+        <Button variant="plain" why={why} onPress={() => shelve(0)}>{t`Show again`}</Button>
       ) : (
         record.retain &&
         record.can_be_shelved && (
-          <Button look="plain" why={why} onPress={() => shelve(SHELVED_FOR)}>{t`Shelve for 1 h`}</Button>
+          <Button variant="plain" why={why} onPress={() => shelve(SHELVED_FOR)}>{t`Shelve for 1 h`}</Button>
         )
       )}
     </li>

@@ -5,7 +5,7 @@ import { useEffect, useState } from "react";
 import { translate, translatedAlarm } from "../../i18n/serverMessages";
 import type { AlarmRecord } from "../../protocol/types";
 import { call, serves } from "../../session/connection";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 
 /** Maximum number of alarms that a list loads. */
 const MAX_ALARMS = 200;
@@ -13,7 +13,7 @@ const MAX_ALARMS = 200;
 export type Show = "retained" | "shelved" | "all";
 
 /** Return whether a list with this filter contains an alarm. */
-export function isShown(record: AlarmRecord, show: Show): boolean {
+function isShown(record: AlarmRecord, show: Show): boolean {
   if (show === "all") return true;
   return show === "shelved" ? record.shelved_until !== undefined : record.retain && record.shelved_until === undefined;
 }
@@ -31,7 +31,7 @@ export function useAlarms(show: Show): AlarmRecord[] | null {
   useEffect(() => {
     if (!ready || !serves("ListAlarms")) return;
     let current = true;
-    const { runtime } = now();
+    const { runtime } = getState();
     runtime.takeAlarm ??= new Set();
     const listeners = runtime.takeAlarm;
     const take = (record: AlarmRecord) => setAlarms((known) => withChanged(known ?? [], translated(record), show));

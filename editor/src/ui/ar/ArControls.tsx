@@ -25,7 +25,7 @@ function Word({ children }: { children: string }) {
 }
 
 export default function ArControls({ engine, ar }: { engine: Engine; ar: Ar }) {
-  const { word, shape, look } = gradeOf(ar);
+  const { word, shape, tone } = gradeOf(ar);
   const registered = ar.seenAt > 0 && ar.phase !== "hand";
   const stale = ar.phase === "bridging" && Date.now() - ar.seenAt < STALE_AFTER;
   const advice = stale || ar.frozen ? "" : adviceOf(ar);
@@ -47,7 +47,7 @@ export default function ArControls({ engine, ar }: { engine: Engine; ar: Ar }) {
           </Button>
         )}
         <Button icon="eye" onPress={() => leaveAr(true)}>
-          <Word>{t`Seat view`}</Word>
+          <Word>{t`3D view`}</Word>
         </Button>
         <Button icon="zoom" onPress={() => showMarkers(!ar.markers)} aria-pressed={ar.markers}>
           <Word>{t`Markers`}</Word>
@@ -61,7 +61,7 @@ export default function ArControls({ engine, ar }: { engine: Engine; ar: Ar }) {
       </div>
       <div className="ar-corner">
         {ar.placing && <PlaceByHand engine={engine} ar={ar} />}
-        <div className={`ar-status ${look}`} data-phase={ar.phase} role="group" aria-label={t`Quality of AR`}>
+        <div className={`ar-status ${tone}`} data-phase={ar.phase} role="group" aria-label={t`Quality of AR`}>
           <p>
             <span aria-hidden="true">{shape}</span> <strong role="status">{word}</strong>{" "}
             {registered && <span className="ar-quality">{qualityOf(ar)}</span>}
@@ -69,7 +69,7 @@ export default function ArControls({ engine, ar }: { engine: Engine; ar: Ar }) {
           {advice && <p className="small">{advice}</p>}
           {Date.now() - ar.startedAt > REST && (
             <p className="small">
-              {t`You have used AR for half an hour. Seat view continues here without the camera.`}
+              {t`You have used AR for half an hour. Press 3D view to continue without the camera.`}
             </p>
           )}
         </div>

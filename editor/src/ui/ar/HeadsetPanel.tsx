@@ -14,7 +14,7 @@ import { doingWords } from "../../program/position";
 import { whyUnavailable } from "../../store/permissions";
 import { isOnline, isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import type { Ar } from "../../store/ui";
 import { turnedAbout } from "../../transform/placing";
 import { notMovable, targetOf } from "../../transform/target";
@@ -63,7 +63,7 @@ export default function HeadsetPanel({ ar }: { ar: Ar }) {
   }, [runs]);
   const jog = (axis: (typeof AXES)[number], sign: number) => () => {
     if (!robot) return;
-    const linear = { x: 0, y: 0, z: 0, [axis]: sign * now().ui.jogging.speed * FASTEST.linear };
+    const linear = { x: 0, y: 0, z: 0, [axis]: sign * getState().ui.jogging.speed * FASTEST.linear };
     return holdJog(robot.robotId, {
       frame: "world",
       linear,
@@ -72,7 +72,7 @@ export default function HeadsetPanel({ ar }: { ar: Ar }) {
     }).end;
   };
   const turn = (sign: number) => () => {
-    const current = targetOf(now(), now().ui.selection);
+    const current = targetOf(getState(), getState().ui.selection);
     if (current) step(current, turnedAbout(current.pose, { x: 0, y: 0, z: 1 }, sign * TURN));
   };
   const turns = target?.turns && !notMovable(state, target);
@@ -107,7 +107,7 @@ export default function HeadsetPanel({ ar }: { ar: Ar }) {
     },
     { id: "place", label: t`Place`, cells: 3, press: () => openPlacing(true) },
     { id: "leave", label: t`Leave AR`, cells: 3, press: () => leaveAr() },
-    { id: "stop", label: t`Stop motion`, cells: 12, look: "stop", press: stopMotion },
+    { id: "stop", label: t`Stop motion`, cells: 12, style: "stop", press: stopMotion },
   ];
   useEffect(() => xrView()?.headset?.panel.show({ title: `${shape} ${word}`, lines, buttons }));
   return null;

@@ -4,14 +4,14 @@ import { useEffect, useRef } from "react";
 import type { Point } from "../../ar/geometry";
 import { projected } from "../../ar/pose";
 import { decimal } from "../../formats";
-import { now } from "../../store/store";
+import { getState } from "../../store/store";
 
 const SVG = "http://www.w3.org/2000/svg";
 
 export function MarkerOutlines() {
   const drawing = useRef<SVGSVGElement>(null);
   useEffect(() => {
-    const { ar } = now().runtime;
+    const { ar } = getState().runtime;
     if (!ar) return;
     ar.onPicture = () => drawing.current && draw(drawing.current);
     ar.onPicture();
@@ -23,15 +23,15 @@ export function MarkerOutlines() {
 }
 
 function draw(into: SVGSVGElement): void {
-  const session = now().runtime.ar;
+  const session = getState().runtime.ar;
   if (!session?.shown) return;
   const { found, view, lens } = session.shown;
   const shown = (point: Point) => session.onScreen(point);
   const parts: SVGElement[] = [];
-  const polygon = (corners: readonly Point[], look: string) => {
+  const polygon = (corners: readonly Point[], className: string) => {
     const each = document.createElementNS(SVG, "polygon");
     each.setAttribute("points", corners.map((point) => shown(point).join()).join(" "));
-    each.setAttribute("class", look);
+    each.setAttribute("class", className);
     parts.push(each);
   };
   for (const { corners } of session.places.values()) {

@@ -7,7 +7,7 @@ import type { Point } from "../../ar/geometry";
 import type { Direction } from "../../ar/placing";
 import { resetPlacing } from "../../commands/ar";
 import type { Engine } from "../../engine/engine";
-import { now } from "../../store/store";
+import { getState } from "../../store/store";
 import type { Ar } from "../../store/ui";
 import { Button } from "../kit/kit";
 
@@ -37,9 +37,9 @@ export function PlaceByHand({ engine, ar }: { engine: Engine; ar: Ar }) {
   const hand = ar.phase === "hand";
   const act = (change: () => void) => () => {
     change();
-    now().runtime.ar?.keepPlacement();
+    getState().runtime.ar?.keepPlacement();
   };
-  const tilt = (sign: number) => act(() => now().runtime.ar?.tilt(sign * angle * DEGREE));
+  const tilt = (sign: number) => act(() => getState().runtime.ar?.tilt(sign * angle * DEGREE));
   return (
     <div className="ar-placing" role="group" aria-label={t`Place the workplace`}>
       <p className="small">{t`Drag to move. Two fingers turn and zoom.`}</p>
@@ -47,7 +47,9 @@ export function PlaceByHand({ engine, ar }: { engine: Engine; ar: Ar }) {
         <Button
           key={direction}
           aria-label={i18n._(words)}
-          onPress={act(() => now().runtime.ar?.step(direction, { distance: distance / 1000, angle: angle * DEGREE }))}
+          onPress={act(() =>
+            getState().runtime.ar?.step(direction, { distance: distance / 1000, angle: angle * DEGREE }),
+          )}
         >
           {sign}
         </Button>
@@ -83,10 +85,10 @@ function followFingers(view: HTMLElement): () => void {
     if (!fingers.has(event.pointerId)) return;
     const before = points();
     fingers.set(event.pointerId, at(event));
-    now().runtime.ar?.drag(before, points());
+    getState().runtime.ar?.drag(before, points());
   };
   const up = (event: PointerEvent) => {
-    if (fingers.delete(event.pointerId)) now().runtime.ar?.keepPlacement();
+    if (fingers.delete(event.pointerId)) getState().runtime.ar?.keepPlacement();
   };
   view.addEventListener("pointerdown", down, ending);
   view.addEventListener("pointermove", move, ending);

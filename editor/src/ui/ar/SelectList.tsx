@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Button } from "../kit/kit";
 
 export default function SelectList() {
@@ -24,20 +24,20 @@ export default function SelectList() {
     open.dispatchEvent(new Event("change", { bubbles: true }));
   };
   return (
-    <Window title={open.labels[0]?.textContent || open.ariaLabel || t`Choose`} onClose={() => setOpen(null)}>
+    <ModalDialog title={open.labels[0]?.textContent || open.ariaLabel || t`Choose`} onClose={() => setOpen(null)}>
       <div className="ar-choices">
         {[...open.options].map((each) => (
           <Button
             key={each.value}
             isDisabled={each.disabled}
             aria-pressed={each.selected}
-            look={each.selected ? "primary" : ""}
+            variant={each.selected ? "primary" : ""}
             onPress={() => choose(each.value)}
           >
             {each.text}
           </Button>
         ))}
       </div>
-    </Window>
+    </ModalDialog>
   );
 }

@@ -6,7 +6,7 @@ import type { Layout } from "../../ar/places";
 import { type ArMethod, ArProblem, abilitiesOf, methodsOf, obstacleOf } from "../../ar/support";
 import { loadMarkers, loadMethod, startAr } from "../../commands/ar";
 import { notify } from "../../store/store";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Button, Waiting } from "../kit/kit";
 import { reasonOf } from "./reasons";
 
@@ -49,7 +49,7 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
   const byHand = obstacle === "markers" || obstacle === "dictionary";
   const count = layout?.places.size ?? 0;
   return (
-    <Window title={t`Augmented reality`} onClose={onClose}>
+    <ModalDialog title={t`Augmented reality`} onClose={onClose}>
       {!permanent && (
         <>
           <p>
@@ -85,7 +85,7 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
               </Button>
             )}
             <Button
-              look="primary"
+              variant="primary"
               icon="camera"
               isDisabled={!layout || opening}
               onPress={() => start(methods[0] ?? "camera")}
@@ -96,6 +96,6 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
           </>
         )}
       </div>
-    </Window>
+    </ModalDialog>
   );
 }

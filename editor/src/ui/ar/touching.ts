@@ -2,7 +2,7 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import { fitTouched, type Known, knownPoints, type Touched } from "../../ar/touch";
+import { fitTouched, type KnownPoint, knownPoints, type TouchFit } from "../../ar/touch";
 import type { XrArSession } from "../../ar/xrSession";
 
 const CORNERS: readonly MessageDescriptor[] = [
@@ -13,13 +13,17 @@ const CORNERS: readonly MessageDescriptor[] = [
 ];
 
 /** Let the user touch the known points. `show` shows instructions; `end` is called with why it failed, or "". */
-export function touchPoints(view: XrArSession, show: (what: string) => void, end: (failure: string) => void): void {
+export function touchPoints(
+  view: XrArSession,
+  show: (instruction: string) => void,
+  end: (failure: string) => void,
+): void {
   const known = knownPoints(view.places);
   const next = (number: number) => {
     const point = nameOf(known[number]);
     show(t`Touch ${number + 1} of ${known.length}: ${point}. Hold still while you press.`);
   };
-  const done = (points: readonly Known["at"][]) => {
+  const done = (points: readonly KnownPoint["at"][]) => {
     const result = fitTouched(
       known.map(({ at }) => at),
       points,
@@ -31,11 +35,11 @@ export function touchPoints(view: XrArSession, show: (what: string) => void, end
   next(0);
 }
 
-function nameOf({ marker, corner }: Pick<Known, "marker" | "corner"> = { marker: 0, corner: 0 }): string {
+function nameOf({ marker, corner }: Pick<KnownPoint, "marker" | "corner"> = { marker: 0, corner: 0 }): string {
   return t`marker ${marker}, ${i18n._(CORNERS[corner] as MessageDescriptor)}`;
 }
 
-function failureOf(result: Touched, known: readonly Known[]): string {
+function failureOf(result: TouchFit, known: readonly KnownPoint[]): string {
   if (!("problem" in result)) return "";
   if (result.problem === "line") return t`The touched points are on a line. Touch the named corners again.`;
   if (result.points.length === 3) return t`The touched points contradict each other. Touch all of them again.`;

@@ -21,23 +21,23 @@ function movementOf({ distance, angle }: NonNullable<Ar["nudge"]>): string {
   return `${decimal(distance * 1000, 0)} mm, ${decimal((Math.abs(angle) * 180) / Math.PI, 1)}°`;
 }
 
-/** Return the grade as a word, a shape and a look. */
-export function gradeOf(ar: Ar): { word: string; shape: string; look: string } {
-  if (ar.frozen) return { word: t`Frozen`, shape: "❚❚", look: "fair" };
+/** Return the grade as a word, a shape and a tone. */
+export function gradeOf(ar: Ar): { word: string; shape: string; tone: string } {
+  if (ar.frozen) return { word: t`Frozen`, shape: "❚❚", tone: "fair" };
   if (ar.phase === "starting" || ar.phase === "looking") {
-    return { word: ar.configured ? t`Looking for markers` : t`Not placed`, shape: "○", look: "rough" };
+    return { word: ar.configured ? t`Looking for markers` : t`Not placed`, shape: "○", tone: "rough" };
   }
-  if (ar.phase === "hand") return { word: t`Placed by hand`, shape: "▢", look: "fair" };
-  if (ar.phase === "lost" && ar.mode !== "camera") return { word: t`Position lost`, shape: "⊘", look: "rough" };
+  if (ar.phase === "hand") return { word: t`Placed by hand`, shape: "▢", tone: "fair" };
+  if (ar.phase === "lost" && ar.mode !== "camera") return { word: t`Position lost`, shape: "⊘", tone: "rough" };
   if (ar.phase === "tracked" && !ar.nudge) {
-    const look = ar.drifted || ar.grade === "rough" ? "rough" : "fair";
-    return ar.touched ? { word: t`By touch`, shape: "◎", look } : { word: t`Tracked`, shape: "◍", look };
+    const tone = ar.drifted || ar.grade === "rough" ? "rough" : "fair";
+    return ar.touched ? { word: t`By touch`, shape: "◎", tone } : { word: t`Tracked`, shape: "◍", tone };
   }
-  if (!["registered", "tracked"].includes(ar.phase)) return { word: t`No marker in sight`, shape: "◇", look: "rough" };
-  if (ar.nudge) return { word: t`Moved by hand`, shape: "◆", look: "fair" };
-  if (ar.grade === "good") return { word: t`Good`, shape: "●", look: "good" };
-  if (ar.grade === "fair") return { word: t`Fair`, shape: "◐", look: "fair" };
-  return { word: t`Rough`, shape: "△", look: "rough" };
+  if (!["registered", "tracked"].includes(ar.phase)) return { word: t`No marker in sight`, shape: "◇", tone: "rough" };
+  if (ar.nudge) return { word: t`Moved by hand`, shape: "◆", tone: "fair" };
+  if (ar.grade === "good") return { word: t`Good`, shape: "●", tone: "good" };
+  if (ar.grade === "fair") return { word: t`Fair`, shape: "◐", tone: "fair" };
+  return { word: t`Rough`, shape: "△", tone: "rough" };
 }
 
 /** Return the advice that only concerns devices that track themselves; an empty string if there is none. */

@@ -8,8 +8,8 @@ import { type AuditEntry, type AuditOutcome, checkTrail, exportTrail, loadEntrie
 import { refusal } from "../../commands/requests";
 import { dateAndTime } from "../../formats";
 import { ROLE_NAMES, type RoleName } from "../../viewmodel/roles";
-import { Window } from "../kit/dialogs";
-import { OneOf } from "../kit/fields";
+import { ModalDialog } from "../kit/dialogs";
+import { ToggleGroup } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { differences } from "./differences";
@@ -60,13 +60,13 @@ export default function AuditTrail({ onClose }: { onClose: () => void }) {
     setChecked(problem || t`Nothing was edited or removed in entries ${first} to ${last}.`);
   };
   return (
-    <Window title={t`Who did what`} onClose={onClose}>
+    <ModalDialog title={t`Audit trail`} onClose={onClose}>
       <div className="audit-filter">
         <SearchField className="field search" value={text} onChange={setText} autoFocus>
           <Label className="hidden-but-read">{t`Search`}</Label>
           <Input placeholder={t`User, request, item or address`} />
         </SearchField>
-        <OneOf
+        <ToggleGroup
           label={t`Outcome`}
           quiet
           value={outcome}
@@ -97,11 +97,11 @@ export default function AuditTrail({ onClose }: { onClose: () => void }) {
         <Button icon="save" isDisabled={busy} onPress={() => void ask(refusal(exportTrail))}>
           {t`Export all`}
         </Button>
-        <Button look="primary" onPress={onClose}>
+        <Button variant="primary" onPress={onClose}>
           {t`Close`}
         </Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }
 

@@ -1,6 +1,6 @@
 /** The fields that differ between two versions of an item. */
 
-export interface Difference {
+interface Difference {
   /** Names of the fields from the outside in, with dots: `position.x`. */
   field: string;
   before: string;

@@ -80,7 +80,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
         {Array.from({ length: points }, (_, n) => (
           <li key={n}>
             <Button
-              look={n === next ? "primary" : ""}
+              variant={n === next ? "primary" : ""}
               icon={recorded.includes(n) ? "check" : "point"}
               onPress={() => void trying(() => take(n))}
             >
@@ -89,10 +89,10 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
           </li>
         ))}
       </ol>
-      {measurement.fit && <FitSoFar {...measurement.fit} />}
+      {measurement.fit && <CurrentFit {...measurement.fit} />}
       <div className="actions start">
         <Button
-          look="primary"
+          variant="primary"
           why={next < 0 ? "" : t`Record point ${next + 1} first.`}
           onPress={() => void trying(() => finishMeasurement().then(() => end(t`Pose updated.`)))}
         >
@@ -113,7 +113,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
 
 export default AimWizard;
 
-function FitSoFar({ checked, rms, worst, worstPoint }: Fit) {
+function CurrentFit({ checked, rms, worst, worstPoint }: Fit) {
   return (
     <p className="small" role="status">
       {checked

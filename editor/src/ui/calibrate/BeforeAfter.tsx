@@ -3,9 +3,9 @@
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { forgetOldPose, placeAt } from "../../commands/calibrate";
-import { hideGhost, showStanding } from "../../commands/robot";
+import { hideGhost, showGhostWithBase } from "../../commands/robot";
 import { fixed } from "../../formats";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { notMovable } from "../../transform/target";
 import { apart } from "../../viewmodel/frames";
 import { Button } from "../kit/kit";
@@ -24,9 +24,9 @@ export function BeforeAfter({ id }: { id: string }) {
   const shown = moved !== null && (moved.distance > NOTHING || moved.degrees > NOTHING);
   useEffect(() => {
     if (!shown || !isRobot || !was) return;
-    showStanding(id, was);
+    showGhostWithBase(id, was);
     return () => {
-      if (now().ui.ghost?.at === was) hideGhost();
+      if (getState().ui.ghost?.at === was) hideGhost();
     };
   }, [shown, isRobot, id, was]);
   if (!shown || !was) return null;
@@ -37,7 +37,7 @@ export function BeforeAfter({ id }: { id: string }) {
         {isRobot && <span className="quiet small"> {t`Transparent: previous pose.`}</span>}
       </p>
       <div className="actions start">
-        <Button look="primary" onPress={forgetOldPose}>
+        <Button variant="primary" onPress={forgetOldPose}>
           {t`Keep the new pose`}
         </Button>
         <Button

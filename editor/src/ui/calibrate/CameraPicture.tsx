@@ -8,7 +8,7 @@ import { decimal } from "../../formats";
 import type { MarkerCorners } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
-import { OnOff } from "../kit/fields";
+import { SwitchField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { RefusedText } from "../points/Refusal";
 import { useTicking } from "../times";
@@ -91,12 +91,12 @@ export function CameraPicture({ id, why }: { id: string; why: string }) {
         <Button why={why || cannotFind} isDisabled={follows} onPress={() => void once(true)}>
           {t`Find markers`}
         </Button>
-        <OnOff
+        <SwitchField
           isSelected={follows}
           onChange={(on) => (why ? setFeed((known) => ({ ...known, failure: why })) : setLive(on))}
         >
           {t`Live picture`}
-        </OnOff>
+        </SwitchField>
       </div>
       {markers && !follows && (
         <p className="quiet small" role="status">

@@ -8,9 +8,9 @@ import { refusal } from "../../commands/requests";
 import { chosenRobot, effectorPose, notReady } from "../../commands/robot";
 import { translated } from "../../i18n/choices";
 import type { Pivot, Position } from "../../protocol/types";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
-import { OneOf, OnOff } from "../kit/fields";
+import { SwitchField, ToggleGroup } from "../kit/fields";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { useWhyNot } from "../points/editing";
@@ -36,7 +36,7 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       <RobotChooser />
-      <OneOf label={t`Touched part`} value={pivot} choices={translated(PIVOTS)} onChange={setPivot} />
+      <ToggleGroup label={t`Touched part`} value={pivot} choices={translated(PIVOTS)} onChange={setPivot} />
       <Preview key={id} id={id} pivot={pivot} why={why || noRobot} />
       <Button
         icon="robot"
@@ -66,9 +66,9 @@ function Preview({ id, pivot, why }: { id: string; pivot: Pivot; why: string }) 
   useEffect(() => (shown ? () => hideAtTool(id) : undefined), [shown, id]);
   return (
     <>
-      <OnOff isSelected={shown} onChange={(to) => (why ? setCannot(why) : setOn(to))}>
+      <SwitchField isSelected={shown} onChange={(to) => (why ? setCannot(why) : setOn(to))}>
         {t`Preview on the tool`}
-      </OnOff>
+      </SwitchField>
       <RefusedText>{cannot}</RefusedText>
     </>
   );
@@ -91,7 +91,7 @@ function ThreePoints({ id, why }: { id: string; why: string }) {
   const place = () =>
     refusal(async () => {
       if (!origin || !onX || !inPlane) return;
-      const found = await frameByAxes(origin, onX, [inPlane], { object_id: id, object_name: nameOf(now(), id) });
+      const found = await frameByAxes(origin, onX, [inPlane], { object_id: id, object_name: nameOf(getState(), id) });
       const refusedPose = await placeAt(id, found.pose);
       if (refusedPose) throw new Error(refusedPose);
       setVerdict(verdictOf(found));
@@ -109,7 +109,7 @@ function ThreePoints({ id, why }: { id: string; why: string }) {
         ))}
       </div>
       <Button
-        look="primary"
+        variant="primary"
         why={why || (origin && onX && inPlane ? "" : t`Touch all three points first.`)}
         isDisabled={busy}
         onPress={() => void ask(place())}

@@ -5,7 +5,7 @@ import { useEffect, useState } from "react";
 import { type CalibrationRecord, recordsOf, verdictOf } from "../../commands/calibrate";
 import { ago, dateAndTime, fixed } from "../../formats";
 import type { State } from "../../store/state";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { useTicking } from "../times";
 import { BeforeAfter } from "./BeforeAfter";
@@ -17,7 +17,7 @@ const endedTasks = ({ tasks }: State): ReadonlySet<string> =>
 export function Records({ id }: { id: string }) {
   const name = useEditor((state) => nameOf(state, id));
   // The cause of an earlier failure may have been removed in the meantime, for example by configuring markers.
-  const [before] = useState(() => endedTasks(now()));
+  const [before] = useState(() => endedTasks(getState()));
   const task = useEditor((state) =>
     Object.values(state.tasks).findLast(
       (each) => each.kind === "calibration" && each.title.includes(name) && !before.has(each.id),

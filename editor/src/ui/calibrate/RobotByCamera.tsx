@@ -7,7 +7,7 @@ import { notReady } from "../../commands/robot";
 import { derivesFrom } from "../../store/selectors";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
-import { OnOff, Pick } from "../kit/fields";
+import { SelectField, SwitchField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { useWhyNot } from "../points/editing";
 import { RefusedText, useRefusal } from "../points/Refusal";
@@ -37,16 +37,16 @@ const RobotByCamera: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       {ids.length > 1 && (
-        <Pick
+        <SelectField
           label={t`Camera`}
           value={camera}
           choices={ids.map((each, n) => [each, names[n] ?? ""] as const)}
           onChange={setWanted}
         />
       )}
-      <OnOff isSelected={moves} onChange={setMoves}>
+      <SwitchField isSelected={moves} onChange={setMoves}>
         {t`Move the robot into view`}
-      </OnOff>
+      </SwitchField>
       <Button
         icon="robot"
         className="wraps"

@@ -8,7 +8,7 @@ import type { CellAuthority } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Button, Waiting } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
 import { RefusedText, useRefusal } from "../points/Refusal";
@@ -29,7 +29,7 @@ export default function CellDialog({ onClose }: { onClose: () => void }) {
   const plc = cell && plcText(cell);
   const program = cell && programText(cell);
   return (
-    <Window title={t`Mode and authority`} onClose={onClose}>
+    <ModalDialog title={t`Mode and authority`} onClose={onClose}>
       {!connected && <p>{t`Not connected to the server.`}</p>}
       {connected && !cell && <Waiting>{t`Loading…`}</Waiting>}
       {connected && cell && plc && (
@@ -78,14 +78,14 @@ export default function CellDialog({ onClose }: { onClose: () => void }) {
       {confirming && (
         <Confirm
           title={t`Let the PLC command this cell?`}
-          yes={t`Let the PLC command`}
+          confirmLabel={t`Let the PLC command`}
           onClose={() => setConfirming(false)}
-          onYes={() => command("plc")}
+          onConfirm={() => command("plc")}
         >
           <p>{t`The PLC then starts programs at any time, without a person at a screen.`}</p>
         </Confirm>
       )}
-    </Window>
+    </ModalDialog>
   );
 }
 

@@ -23,7 +23,7 @@ export function CellName() {
   if (!fleet) return <strong className="cell-name">{name}</strong>;
   return (
     <Button
-      look="plain"
+      variant="plain"
       icon="left"
       className="cell-name"
       aria-label={t`${name}: show all workplaces`}

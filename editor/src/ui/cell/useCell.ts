@@ -3,7 +3,7 @@
 import { useEffect, useState } from "react";
 import type { CellStatus } from "../../protocol/types";
 import { call, serves } from "../../session/connection";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 
 /** Return the last known state of the cell; undefined until it is loaded, null if that failed. */
 export function useCell(): CellStatus | null | undefined {
@@ -12,7 +12,7 @@ export function useCell(): CellStatus | null | undefined {
   useEffect(() => {
     if (!ready || !serves("GetCell")) return;
     let current = true;
-    const { runtime } = now();
+    const { runtime } = getState();
     runtime.takeCell ??= new Set();
     const listeners = runtime.takeCell;
     listeners.add(setCell);

@@ -12,7 +12,7 @@ import { FILE_DEADLINE, rest } from "../../session/rest";
 import { whyUnavailable } from "../../store/permissions";
 import { anyAction } from "../../store/scope";
 import { isClosed } from "../../store/selectors";
-import { notify, now, select, setUi, useEditor } from "../../store/store";
+import { getState, notify, select, setUi, useEditor } from "../../store/store";
 import type { ScriptDraft } from "../../store/ui";
 import { nameOf } from "../../viewmodel/names";
 import { Button, Waiting } from "../kit/kit";
@@ -100,17 +100,17 @@ export default function CodeView() {
       if (!loaded) return;
       setChecked(null);
       const { script, revision } = loaded;
-      if (!now().ui.scriptDraft) select(null); // room for the text
+      if (!getState().ui.scriptDraft) select(null); // room for the text
       setUi({ scriptDraft: text === script ? undefined : { projectId: id, script, revision, text } });
     },
     [id, loaded],
   );
   const check = useCallback(async (): Promise<CheckScriptData | null> => {
-    const { scriptDraft } = now().ui;
+    const { scriptDraft } = getState().ui;
     if (!scriptDraft) return null;
     const answer = await call("CheckScript", { script: scriptDraft.text, revision: scriptDraft.revision });
     const result = { ...answer, problems: answer.problems.map(inUserLanguage) };
-    if (now().ui.scriptDraft?.text === scriptDraft.text) setChecked(result);
+    if (getState().ui.scriptDraft?.text === scriptDraft.text) setChecked(result);
     return result;
   }, []);
 
@@ -154,7 +154,7 @@ export default function CodeView() {
         {draft && !reviewing && (
           <>
             <Button onPress={discard}>{t`Discard changes`}</Button>
-            <Button look="primary" why={whyReadOnly} onPress={review}>
+            <Button variant="primary" why={whyReadOnly} onPress={review}>
               {t`Review and import`}
             </Button>
           </>
@@ -238,9 +238,9 @@ function Script({ text, whyReadOnly, hidden, onEdit, check, onReady }: ScriptPro
       running: running.map(nameOfAction),
       breakpoints: new Set(Object.keys(breakpoints).map(nameOfAction)),
       nameOf: (each) => {
-        const { doc } = now();
+        const { doc } = getState();
         const document = [doc?.scene, doc?.project].find((one) => one?.id === each);
-        return document?.name ?? nameOf(now(), each);
+        return document?.name ?? nameOf(getState(), each);
       },
     };
   }, [program, selected, running, breakpoints]);
@@ -252,14 +252,14 @@ function Script({ text, whyReadOnly, hidden, onEdit, check, onReady }: ScriptPro
       onEdit: (edited) => handlers.current.onEdit(edited),
       onAction: (name) => {
         // While editing, a tap places the cursor; the panel would cover the text.
-        const found = now().ui.scriptDraft ? undefined : actionNamed(name);
+        const found = getState().ui.scriptDraft ? undefined : actionNamed(name);
         if (found) select({ kind: "action", id: found });
       },
       onBreakpoint: (name) => {
         const found = actionNamed(name);
-        const cannot = whyUnavailable(now(), "SetBreakpoints");
+        const cannot = whyUnavailable(getState(), "SetBreakpoints");
         if (cannot) notify("info", cannot);
-        else if (found) void breakAt(found, !(found in now().breakpoints));
+        else if (found) void breakAt(found, !(found in getState().breakpoints));
         else notify("info", t`Import the program first: ${name} is new.`);
       },
       check: async () => {
@@ -285,7 +285,7 @@ function Script({ text, whyReadOnly, hidden, onEdit, check, onReady }: ScriptPro
 }
 
 function actionNamed(name: string): string | undefined {
-  const { doc } = now();
+  const { doc } = getState();
   const bodies = doc ? [doc.program, ...Object.values(doc.functions)] : [];
   return bodies.flatMap(({ actions }) => Object.values(actions)).find((each) => each.name === name)?.id;
 }

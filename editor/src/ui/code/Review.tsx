@@ -81,7 +81,7 @@ export function Review({ draft, changes, onClose, onImport }: ReviewProps) {
         )}
         <div className="actions">
           <Button onPress={onClose}>{t`Back`}</Button>
-          <Button look="primary" isDisabled={busy || changes.length === 0} onPress={run}>
+          <Button variant="primary" isDisabled={busy || changes.length === 0} onPress={run}>
             {t`Import`}
           </Button>
         </div>

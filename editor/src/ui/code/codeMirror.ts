@@ -38,7 +38,7 @@ import {
 } from "@codemirror/view";
 import { tags } from "@lezer/highlight";
 import { t } from "@lingui/core/macro";
-import { completing } from "./completing";
+import { completionExtensions } from "./completing";
 import { actionsOf, boilerplate, idsOf, type ScriptAction } from "./script";
 
 /** The marks at the lines of a script, by name of the action. */
@@ -232,7 +232,7 @@ export class CodeMirror {
         indentOnInput(),
         indentUnit.of("    "),
         search({ top: true }),
-        completing(),
+        completionExtensions(),
         linter((view) => handlers.check(view.state.doc.toString()), { delay: 600 }),
         keymap.of([...searchKeymap, ...foldKeymap, ...historyKeymap, ...defaultKeymap]),
         this.editable.of(editing(false)),

@@ -3,14 +3,14 @@
 import { autocompletion, type Completion, type CompletionSource, snippetCompletion } from "@codemirror/autocomplete";
 import { type EditorState, type Extension, StateField } from "@codemirror/state";
 import { showTooltip, type Tooltip } from "@codemirror/view";
-import { now } from "../../store/store";
+import { getState } from "../../store/store";
 import { type Offer, offersAt, parameterWords, resultWords, type Signature, signatureAt } from "./offers";
 
 /** Priority of completions whose type is that of the parameter. */
 const FITS = 50;
 
 const complete: CompletionSource = ({ state, pos, explicit }) => {
-  const { doc, types } = now();
+  const { doc, types } = getState();
   const found = doc && offersAt(state.doc.toString(), pos, doc, types);
   if (!found || (!explicit && found.from === pos && !/[.(]\s*$|, ?$/.test(state.sliceDoc(Math.max(0, pos - 3), pos))))
     return null;
@@ -24,7 +24,7 @@ function completion({ label, type, detail, info, snippet, fits }: Offer): Comple
 
 function tooltip(state: EditorState): Tooltip | null {
   const { from, to } = state.selection.main; // a field of a call that was inserted is selected
-  const { doc, types } = now();
+  const { doc, types } = getState();
   if (state.readOnly || !doc || to > state.doc.lineAt(from).to) return null;
   const found = signatureAt(state.doc.toString(), from, doc, types);
   return found && { pos: found.at, above: true, create: () => ({ dom: elementOf(found) }) };
@@ -57,7 +57,7 @@ const signatures = StateField.define<Tooltip | null>({
 });
 
 /** Return the extensions that complete names and show the signature of the call at the cursor. */
-export const completing = (): Extension => [
+export const completionExtensions = (): Extension => [
   autocompletion({ override: [complete], icons: false, maxRenderedOptions: 60 }),
   signatures,
 ];

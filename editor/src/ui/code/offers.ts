@@ -21,7 +21,7 @@ export interface Offer {
   fits?: boolean;
 }
 
-export interface Offers {
+interface Offers {
   /** Where the replaced word starts. */
   from: number;
   offers: Offer[];

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { theClient } from "../../session/connection";
-import { notify, now, useEditor } from "../../store/store";
+import { getState, notify, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import "./lost.css";
@@ -13,7 +13,7 @@ export function LostConnection() {
   const unsaved = useEditor((state) => state.doc?.unsaved ?? false);
   useEffect(() => {
     // The document is restored before the status becomes ready.
-    if (status === "ready" && now().doc?.unsaved) notify("info", t`Your unsaved changes are still available.`);
+    if (status === "ready" && getState().doc?.unsaved) notify("info", t`Your unsaved changes are still available.`);
   }, [status]);
   if (status === "ready") return null;
   return (
@@ -33,7 +33,7 @@ export function LostConnection() {
               .join(" ")}
       </p>
       {status === "lost" && (
-        <Button look="plain" onPress={() => theClient().reconnectNow()}>
+        <Button variant="plain" onPress={() => theClient().reconnectNow()}>
           {t`Try now`}
         </Button>
       )}

@@ -6,8 +6,8 @@ import { notEditable, startConnecting } from "../../commands/program";
 import { detailOf } from "../../program/functions";
 import { lanesOf } from "../../program/lanes";
 import type { Action } from "../../protocol/types";
-import type { Of } from "../../store/state";
-import { notify, now, useEditor } from "../../store/store";
+import type { OnPoint } from "../../store/state";
+import { getState, notify, useEditor } from "../../store/store";
 import { deviceIcon } from "../kit/deviceIcons";
 import { Drawing, Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
@@ -28,7 +28,7 @@ export type FlowNodeType = Node<
 >;
 
 /** The connection point of a node for error exits. */
-export const FAILS = "fails";
+export const ERROR_HANDLE = "fails";
 
 const onError = (): Branch => ({ id: "error", label: t`On error` });
 
@@ -74,7 +74,7 @@ export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
       {box.values && <div className="small flow-values">{box.values}</div>}
       <div className="flow-branches">
         {box.branches.map((branch) => (
-          <Out key={branch.id} id={lastIn(box)} name={box.name} branch={branch} />
+          <BranchHandle key={branch.id} id={lastIn(box)} name={box.name} branch={branch} />
         ))}
         {box.branches.length === 0 && box.kind !== "end" && (
           <Handle type="source" position={Position.Bottom} className="flow-none" isConnectable={false} aria-hidden />
@@ -83,14 +83,14 @@ export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
       {(box.kind === "action" || box.kind === "fold") && (
         <>
           <Handle
-            id={FAILS}
+            id={ERROR_HANDLE}
             type="source"
             position={Position.Right}
             className="flow-none"
             isConnectable={false}
             aria-hidden
           />
-          {selected && box.kind === "action" && <Out id={box.id} name={box.name} branch={onError()} />}
+          {selected && box.kind === "action" && <BranchHandle id={box.id} name={box.name} branch={onError()} />}
         </>
       )}
     </div>
@@ -98,7 +98,7 @@ export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
 }
 
 /** A call that parallel work runs: what it does now. The graph selects it at a tap. */
-function Lane({ call }: { call: Of<Action> }) {
+function Lane({ call }: { call: OnPoint<Action> }) {
   const running = useEditor((state) => state.program.running.includes(call.id));
   const waits = useEditor((state) => state.program.state === "paused");
   const doing = useEditor((state) => lanesOf(state).find((each) => each.id === call.id)?.doing ?? "");
@@ -118,7 +118,7 @@ function Lane({ call }: { call: Of<Action> }) {
 }
 
 /** A free branch, or the exit of errors. */
-function Out({ id, name, branch }: { id: string; name: string; branch: Branch }) {
+function BranchHandle({ id, name, branch }: { id: string; name: string; branch: Branch }) {
   return (
     <Handle
       id={branch.id}
@@ -130,12 +130,12 @@ function Out({ id, name, branch }: { id: string; name: string; branch: Branch })
       aria-label={`${name}: ${branch.label}`}
       onClick={(event) => {
         event.stopPropagation();
-        begin(id, branch);
+        startConnection(id, branch);
       }}
       onKeyDown={(event) => {
         if (event.key !== "Enter" && event.key !== " ") return;
         event.stopPropagation();
-        begin(id, branch);
+        startConnection(id, branch);
       }}
     >
       {branch.label}
@@ -149,8 +149,8 @@ export function conditionOf(branch: Branch) {
     : undefined;
 }
 
-function begin(id: string, branch: Branch): void {
-  const why = notEditable(now(), "AddLogicItem");
+function startConnection(id: string, branch: Branch): void {
+  const why = notEditable(getState(), "AddLogicItem");
   if (why) notify("info", why);
   else startConnecting(id, conditionOf(branch), undefined, branch.id === "error");
 }

@@ -22,11 +22,11 @@ import { problemsHere, problemsOf } from "../../program/problems";
 import { placeOf } from "../../program/steps";
 import { takenExit } from "../../program/taken";
 import { scopeOf } from "../../store/scope";
-import { notify, now, select, setUi, useEditor } from "../../store/store";
+import { getState, notify, select, setUi, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { inColumns } from "./columns";
-import { conditionOf, FAILS, FlowNode, type FlowNodeType } from "./FlowNode";
+import { conditionOf, ERROR_HANDLE, FlowNode, type FlowNodeType } from "./FlowNode";
 import { foldAll, unfold, useFolds } from "./folding";
 import { type Box, firstIn, graphOf, lastIn } from "./graph";
 import { usePressed } from "./usePressed";
@@ -58,22 +58,22 @@ function useChoose(): (box: Pick<Box, "id" | "kind" | "run">) => void {
   const ended = useRef("");
   return (box) => {
     const id = firstIn(box);
-    if (now().ui.connecting) {
-      if (selectionOf(now(), id)?.kind === "logic") return;
+    if (getState().ui.connecting) {
+      if (selectionOf(getState(), id)?.kind === "logic") return;
       ended.current = id;
       setTimeout(() => (ended.current = ""));
       void finishConnecting(id);
       return;
     }
     if (ended.current === id) return;
-    if (now().ui.picked) {
+    if (getState().ui.picked) {
       ended.current = id;
       setTimeout(() => (ended.current = ""));
       for (const each of box.kind === "fold" ? box.run : [id]) pickAction(each);
       return;
     }
     if (box.kind === "fold") return unfold(box.run);
-    select(selectionOf(now(), id));
+    select(selectionOf(getState(), id));
     setUi({ tool: "" });
   };
 }
@@ -144,7 +144,7 @@ function Flow() {
     return {
       id: line.id,
       source: line.from,
-      ...(line.branch === "error" && { sourceHandle: FAILS }),
+      ...(line.branch === "error" && { sourceHandle: ERROR_HANDLE }),
       target: line.to,
       ...(graph.detours.has(line.id)
         ? { type: "wrapped", data: { detour: graph.detours.get(line.id) } }
@@ -203,7 +203,7 @@ function Flow() {
           cannotLead(doc, lastIn(box(source)), firstIn(box(target)), "", sourceHandle === "error") === ""
         }
         onConnect={({ source, target, sourceHandle }) => {
-          const why = notEditable(now(), "AddLogicItem");
+          const why = notEditable(getState(), "AddLogicItem");
           if (why) return notify("info", why);
           if (sourceHandle === "error") return void addErrorExit(lastIn(box(source)), firstIn(box(target)));
           const branch = box(source).branches.find((each) => each.id === sourceHandle);
@@ -211,16 +211,16 @@ function Flow() {
         }}
         onNodeClick={({ target }, { id }) => {
           const call = (target as Element).closest<HTMLElement>("[data-call]")?.dataset.call;
-          if (call === undefined || now().ui.connecting || now().ui.picked) return choose(box(id));
+          if (call === undefined || getState().ui.connecting || getState().ui.picked) return choose(box(id));
           select({ kind: "action", id: call });
           setUi({ tool: "" });
         }}
         onEdgeClick={(_, { id }) => choose({ id, kind: "action", run: [] })}
-        onPaneClick={() => (now().ui.connecting ? setUi({ connecting: null }) : select(null))}
+        onPaneClick={() => (getState().ui.connecting ? setUi({ connecting: null }) : select(null))}
         onNodesChange={(changes) => {
           // Enter selects the focused node.
           for (const change of changes)
-            if (change.type === "select" && change.selected && change.id !== now().ui.selection?.id)
+            if (change.type === "select" && change.selected && change.id !== getState().ui.selection?.id)
               choose(box(change.id));
         }}
         onDelete={({ nodes: gone, edges: lines }) =>
@@ -270,9 +270,9 @@ function Flow() {
 
 /** Remove only the selected node: the command removes its connections. */
 async function remove(nodes: string[], lines: string[]): Promise<void> {
-  const why = notEditable(now(), "RemoveAction");
+  const why = notEditable(getState(), "RemoveAction");
   if (why) return notify("info", why);
-  const { doc } = now();
+  const { doc } = getState();
   for (const id of nodes) if (doc && id in doc.actions) await removeAction(id);
   if (nodes.length === 0) for (const id of lines) await removeStep(id);
 }

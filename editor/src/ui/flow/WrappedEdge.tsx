@@ -3,7 +3,7 @@
 import { BaseEdge, type Edge, type EdgeProps, Position } from "@xyflow/react";
 import type { Detour } from "./columns";
 
-export type WrappedEdgeType = Edge<{ detour: Detour }, "wrapped">;
+type WrappedEdgeType = Edge<{ detour: Detour }, "wrapped">;
 
 /** Distance from a node to the first bend, and radius of bends. */
 const OUT = 20;

@@ -26,7 +26,7 @@ export interface Detour {
   left: number;
 }
 
-export interface Wrapped extends Graph {
+interface Wrapped extends Graph {
   /** Detours of connections by their ids. */
   detours: Map<string, Detour>;
 }

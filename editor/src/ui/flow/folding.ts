@@ -5,7 +5,7 @@ import { storeViewState } from "../../commands/viewstate";
 import type { Problem } from "../../program/problems";
 import { foldedRuns, runsOf } from "../../program/runs";
 import { isRunning } from "../../store/selectors";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 
 const KEY = "folded";
 const NONE: readonly string[] = [];
@@ -14,25 +14,25 @@ function storedFolds(stored: unknown): readonly string[] {
   return Array.isArray(stored) && stored.length > 0 ? stored.filter((each) => typeof each === "string") : NONE;
 }
 
-const keep = (ids: Iterable<string>): void => {
-  const doc = now().doc;
+const storeFolds = (ids: Iterable<string>): void => {
+  const doc = getState().doc;
   // Remove folds of deleted actions.
   const known = [...new Set(ids)].filter((id) => doc && id in doc.actions);
   storeViewState("user", { [KEY]: known.length > 0 ? known : null });
 };
 
 /** Store all actions of a sequence, so that it stays folded when its first action changes. */
-export const fold = (run: readonly string[]): void => keep([...storedFolds(now().view.user[KEY]), ...run]);
+export const fold = (run: readonly string[]): void => storeFolds([...storedFolds(getState().view.user[KEY]), ...run]);
 
 export const unfold = (run: readonly string[]): void =>
-  keep(storedFolds(now().view.user[KEY]).filter((id) => !run.includes(id)));
+  storeFolds(storedFolds(getState().view.user[KEY]).filter((id) => !run.includes(id)));
 
 export function foldAll(on: boolean): void {
-  const { doc } = now();
-  keep(on && doc ? runsOf(doc).flat() : NONE);
+  const { doc } = getState();
+  storeFolds(on && doc ? runsOf(doc).flat() : NONE);
 }
 
-export interface Folds {
+interface Folds {
   /** Return the number of sequences that can be folded. */
   runs: number;
   /** Return whether the user has folded any. */

@@ -19,7 +19,7 @@ import {
 import { callsIn, isParallel, parallelOf } from "../../program/parallel";
 import { valuesOf } from "../../program/step";
 import type { Action } from "../../protocol/types";
-import type { Of, OpenDocument, State } from "../../store/state";
+import type { OnPoint, OpenDocument, State } from "../../store/state";
 
 const NODE = { width: 250, height: 66 };
 /** Height of a node with a name only. */
@@ -30,7 +30,7 @@ const LINE = 21;
 const BRANCHES = 22;
 /** Additional height for a call that parallel work runs. */
 export const LANE = 46;
-const BORDER = { width: 132, height: 68 };
+const TERMINAL = { width: 132, height: 68 };
 
 /** A free branch of an action: the next step, one for a value of its result, or an error exit. */
 export interface Branch {
@@ -53,7 +53,7 @@ export interface Box {
   icon?: string | undefined;
   branches: Branch[];
   /** The calls that it runs at once. */
-  lanes?: Of<Action>[] | undefined;
+  lanes?: OnPoint<Action>[] | undefined;
   /** Folded actions in their order. */
   run: string[];
   x: number;
@@ -102,7 +102,7 @@ export function graphOf(
       values: "",
       branches: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: t`next` }],
       run: [],
-      ...BORDER,
+      ...TERMINAL,
     },
     ...Object.values(doc.actions)
       .filter((action) => !into.has(action.id) && !branches.has(action.id))
@@ -131,7 +131,7 @@ export function graphOf(
       run,
       ...sized(branchesOf(doc, types, run.at(-1) ?? "")),
     })),
-    { id: END, kind: "end", name: t`End`, detail: "", values: "", branches: [], run: [], ...BORDER },
+    { id: END, kind: "end", name: t`End`, detail: "", values: "", branches: [], run: [], ...TERMINAL },
   ];
   const places = placed(bare, lines);
   return { boxes: bare.map((box) => ({ ...box, ...(places.get(box.id) ?? { x: 0, y: 0 }) })), lines };
@@ -150,7 +150,7 @@ function sized(branches: Branch[], values = false, lanes = 0): Pick<Box, "branch
 }
 
 /** Return the free branches of an action. */
-export function branchesOf(doc: OpenDocument, types: State["types"], id: string): Branch[] {
+function branchesOf(doc: OpenDocument, types: State["types"], id: string): Branch[] {
   const action = doc.actions[id];
   if (!action) return [];
   const branches = nextSteps(doc, id);

@@ -8,7 +8,7 @@ import { problemsOf } from "../../program/problems";
 import { program, TYPES } from "../../program/testing";
 import type { Action } from "../../protocol/types";
 import { functionOf } from "../../store/scope";
-import { initialState, type Of, type OpenFunction } from "../../store/state";
+import { initialState, type OnPoint, type OpenFunction } from "../../store/state";
 import { ItemMaker } from "../../viewmodel/items";
 import { graphOf } from "./graph";
 
@@ -85,11 +85,17 @@ describe("parallel work", () => {
     expect(whyNotAtOnce(nested, [first as never, through])).toContain(
       "one and far both use device: count_one and count_two",
     );
-    const other = { ...called, actions: { x: { ...(called.actions.count_two as Of<Action>), type: "camera/look" } } };
+    const other = {
+      ...called,
+      actions: { x: { ...(called.actions.count_two as OnPoint<Action>), type: "camera/look" } },
+    };
     const apart = { ...doc, functions: { ...doc.functions, pfu_two: other } };
     expect(problemsOf(apart, TYPES).map(({ id }) => id)).not.toContain("both");
     expect(whyNotAtOnce(apart, [first as never, second as never])).toBe("");
-    const parallel = { ...called, actions: { x: { ...(doc.actions.both as Of<Action>), id: "x", name: "again" } } };
+    const parallel = {
+      ...called,
+      actions: { x: { ...(doc.actions.both as OnPoint<Action>), id: "x", name: "again" } },
+    };
     const deep = { ...doc, functions: { ...doc.functions, pfu_two: parallel } };
     expect(whyNotAtOnce(deep, [first as never, second as never])).toBe("two contains other parallel work, again.");
   });

@@ -7,7 +7,7 @@ export interface Rect {
   height: number;
 }
 
-export interface Viewport {
+interface Viewport {
   x: number;
   y: number;
   zoom: number;

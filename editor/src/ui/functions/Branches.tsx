@@ -9,9 +9,9 @@ import { CALL, calledBy } from "../../program/operands";
 import { callsIn } from "../../program/parallel";
 import { valuesOf } from "../../program/step";
 import type { Action } from "../../protocol/types";
-import type { Of, OpenDocument, State } from "../../store/state";
+import type { OnPoint, OpenDocument, State } from "../../store/state";
 import { select, useEditor } from "../../store/store";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
 import { OpenButton } from "./FunctionOffers";
@@ -40,7 +40,7 @@ const Branches: Section["Body"] = ({ selection: { id } }) => {
         ))}
       </ul>
       {calls.length < MAX_BRANCHES ? (
-        <Pick
+        <SelectField
           label={t`Add a branch`}
           value=""
           choices={[["", t`choose…`], ...offers(doc, calls)]}
@@ -51,7 +51,7 @@ const Branches: Section["Body"] = ({ selection: { id } }) => {
         <p className="quiet small">{t`Parallel work has at most four branches.`}</p>
       )}
       <div className="row">
-        <Button look="plain" why={why} onPress={() => void dissolveParallel(id)}>
+        <Button variant="plain" why={why} onPress={() => void dissolveParallel(id)}>
           {t`Run one after the other`}
         </Button>
       </div>
@@ -61,7 +61,7 @@ const Branches: Section["Body"] = ({ selection: { id } }) => {
 export default Branches;
 
 /** Return the functions that can be another branch. */
-const offers = (doc: OpenDocument, calls: readonly Of<Action>[]): [string, string][] =>
+const offers = (doc: OpenDocument, calls: readonly OnPoint<Action>[]): [string, string][] =>
   Object.values(doc.functions)
     .filter(({ id, name }) => whyNotAtOnce(doc, [...calls, { name, type: `${id}/${CALL}` }]) === "")
     .sort(byName)
@@ -70,7 +70,7 @@ const offers = (doc: OpenDocument, calls: readonly Of<Action>[]): [string, strin
 interface BranchProps {
   state: State;
   doc: OpenDocument;
-  call: Of<Action>;
+  call: OnPoint<Action>;
   /** Id of the parallel action. */
   owner: string;
   /** Why it cannot be removed. */
@@ -84,7 +84,7 @@ function Branch({ state, doc, call, owner, why }: BranchProps) {
   const detail = [called && t`function ${called.name}`, valuesOf(doc, state.types, call)].filter(Boolean).join(" · ");
   return (
     <li data-running={running}>
-      <Button look="plain" className="next-step" onPress={() => select({ kind: "action", id: call.id })}>
+      <Button variant="plain" className="next-step" onPress={() => select({ kind: "action", id: call.id })}>
         <span>
           {call.name} {running && <span className="tag good">{t`running`}</span>}
           <span className="quiet small lane-detail">{doing || detail}</span>
@@ -92,7 +92,7 @@ function Branch({ state, doc, call, owner, why }: BranchProps) {
       </Button>
       {called && <OpenButton id={called.id} name={called.name} />}
       <Button
-        look="plain"
+        variant="plain"
         icon="close"
         aria-label={t`Remove ${call.name}`}
         why={why}

@@ -30,7 +30,7 @@ const CallSection: Section["Body"] = ({ selection: { id } }) => {
         </span>
       </p>
       {owner && (
-        <Button look="plain" icon="parallel" onPress={() => select({ kind: "action", id: owner.id })}>
+        <Button variant="plain" icon="parallel" onPress={() => select({ kind: "action", id: owner.id })}>
           {t`Branch of ${owner.name}`}
         </Button>
       )}
@@ -39,7 +39,7 @@ const CallSection: Section["Body"] = ({ selection: { id } }) => {
           {t`Open function`}
         </Button>
         {!owner && (
-          <Button look="plain" why={why} onPress={() => void dissolve(id)}>
+          <Button variant="plain" why={why} onPress={() => void dissolve(id)}>
             {t`Replace by its actions`}
           </Button>
         )}

@@ -13,7 +13,7 @@ import { notEditable } from "../../commands/program";
 import { callsOf, functionNames } from "../../program/functions";
 import { START } from "../../program/steps";
 import { scopeOf } from "../../store/scope";
-import { now, select, setUi, useEditor } from "../../store/store";
+import { getState, select, setUi, useEditor } from "../../store/store";
 import { AskName, More } from "../kit/lazyControls";
 
 export function FunctionMenu({ id }: { id: string }) {
@@ -26,7 +26,7 @@ export function FunctionMenu({ id }: { id: string }) {
   const why = notEditable(state, "RenameFunction");
   const calls = callsOf(doc, id).map((each) => each.action.name);
   const showParameters = () => {
-    const open = now().doc;
+    const open = getState().doc;
     if (open && scopeOf(open) !== id) openFunction(id);
     setUi({ tool: "" });
     select({ kind: "terminal", id: START });
@@ -37,18 +37,18 @@ export function FunctionMenu({ id }: { id: string }) {
         label={t`Function ${name}`}
         choices={[
           { id: "parameters", label: t`Parameters`, icon: "settings", act: showParameters },
-          { id: "rename", label: t`Rename`, not: why, act: () => setRenaming(true) },
+          { id: "rename", label: t`Rename`, why, act: () => setRenaming(true) },
           {
             id: "duplicate",
             label: t`Duplicate`,
-            not: notEditable(state, "ImportFunction"),
+            why: notEditable(state, "ImportFunction"),
             act: () => void duplicateFunction(id),
           },
           { id: "export", label: t`Export to a file`, icon: "save", act: () => void exportFunction(id) },
           {
             id: "remove",
             label: t`Remove`,
-            not: why || (calls.length > 0 ? t`Called by ${calls.join(", ")}.` : ""),
+            why: why || (calls.length > 0 ? t`Called by ${calls.join(", ")}.` : ""),
             act: () => void removeFunction(id),
           },
         ]}
@@ -57,9 +57,9 @@ export function FunctionMenu({ id }: { id: string }) {
         <AskName
           title={t`Rename the function`}
           initial={name}
-          yes={t`Rename`}
+          confirmLabel={t`Rename`}
           taken={functionNames(doc)}
-          onYes={(wanted) => void renameFunction(id, wanted)}
+          onConfirm={(wanted) => void renameFunction(id, wanted)}
           onClose={() => setRenaming(false)}
         />
       )}

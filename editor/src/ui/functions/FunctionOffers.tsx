@@ -23,7 +23,7 @@ const ParallelDialog = lazyComponent(() => import("./ParallelDialog"));
 const ImportDialog = lazyComponent(() => import("./ImportDialog"));
 
 export function OpenButton({ id, name }: { id: string; name: string }) {
-  return <Button look="plain" icon="function" aria-label={t`Open ${name}`} onPress={() => openFunction(id)} />;
+  return <Button variant="plain" icon="function" aria-label={t`Open ${name}`} onPress={() => openFunction(id)} />;
 }
 
 /** `slot`: where parallel work is added. */
@@ -55,7 +55,7 @@ export function NewFunction({ slot }: { slot: Slot | null }) {
           {t`Run in parallel`}
         </Button>
       )}
-      <Button look="plain" why={why} onPress={() => input.current?.click()}>
+      <Button variant="plain" why={why} onPress={() => input.current?.click()}>
         {t`Import a function`}
       </Button>
       <input
@@ -74,9 +74,9 @@ export function NewFunction({ slot }: { slot: Slot | null }) {
         <AskName
           title={t`New function`}
           initial={freeFunctionName("function_1")}
-          yes={t`Add`}
+          confirmLabel={t`Add`}
           taken={functionNames(doc)}
-          onYes={(name) => void addFunction(name)}
+          onConfirm={(name) => void addFunction(name)}
           onClose={() => setNaming(false)}
         />
       )}

@@ -5,8 +5,8 @@ import { useState } from "react";
 import { type FunctionFile, importFunction } from "../../commands/functions";
 import { byName } from "../../formats";
 import { useEditor } from "../../store/store";
-import { Window } from "../kit/dialogs";
-import { Pick } from "../kit/fields";
+import { ModalDialog } from "../kit/dialogs";
+import { SelectField } from "../kit/fields";
 import { Button } from "../kit/kit";
 
 export default function ImportDialog({ file, onClose }: { file: FunctionFile; onClose: () => void }) {
@@ -20,10 +20,10 @@ export default function ImportDialog({ file, onClose }: { file: FunctionFile; on
     if (!refused) onClose();
   };
   return (
-    <Window title={t`Import a function`} onClose={onClose}>
+    <ModalDialog title={t`Import a function`} onClose={onClose}>
       <p>{t`The function uses action points that this project lacks. Choose one for each.`}</p>
       {file.points.map((name) => (
-        <Pick
+        <SelectField
           key={name}
           label={t`Instead of ${name}`}
           value={chosen[name] ?? ""}
@@ -38,10 +38,10 @@ export default function ImportDialog({ file, onClose }: { file: FunctionFile; on
       )}
       <div className="actions">
         <Button onPress={onClose}>{t`Cancel`}</Button>
-        <Button look="primary" isDisabled={file.points.some((name) => !chosen[name])} onPress={() => void submit()}>
+        <Button variant="primary" isDisabled={file.points.some((name) => !chosen[name])} onPress={() => void submit()}>
           {t`Import`}
         </Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }

@@ -8,7 +8,7 @@ import type { Slot } from "../../program/chain";
 import { devicesOf, MAX_BRANCHES, MIN_BRANCHES, whyNotAtOnce } from "../../program/lanes";
 import { CALL } from "../../program/operands";
 import { useEditor } from "../../store/store";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Field } from "../kit/Field";
 import { Button } from "../kit/kit";
 
@@ -28,7 +28,7 @@ export default function ParallelDialog({ slot, onClose }: { slot: Slot | null; o
     onClose();
   };
   return (
-    <Window title={t`Run in parallel`} onClose={onClose}>
+    <ModalDialog title={t`Run in parallel`} onClose={onClose}>
       <p>{t`Select two to four functions. The program continues when all of them have ended.`}</p>
       <fieldset className="parallel-choices">
         <legend className="hidden-but-read">{t`Functions`}</legend>
@@ -57,10 +57,10 @@ export default function ParallelDialog({ slot, onClose }: { slot: Slot | null; o
       )}
       <div className="actions">
         <Button onPress={onClose}>{t`Cancel`}</Button>
-        <Button look="primary" isDisabled={!fits || clash !== "" || name.trim() === ""} onPress={submit}>
+        <Button variant="primary" isDisabled={!fits || clash !== "" || name.trim() === ""} onPress={submit}>
           {t`Run in parallel`}
         </Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }

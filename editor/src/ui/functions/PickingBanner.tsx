@@ -50,21 +50,21 @@ export default function PickingBanner() {
         {ids.length > 0 && shown && <span className="small"> {shown}</span>}
       </p>
       {calls && (
-        <Button look="primary" icon="parallel" why={notAtOnce} onPress={() => setAsking("parallel")}>
+        <Button variant="primary" icon="parallel" why={notAtOnce} onPress={() => setAsking("parallel")}>
           {t`Run in parallel`}
         </Button>
       )}
-      <Button look={calls ? "" : "primary"} icon="function" why={why} onPress={() => setAsking("function")}>
+      <Button variant={calls ? "" : "primary"} icon="function" why={why} onPress={() => setAsking("function")}>
         {t`Make a function`}
       </Button>
-      <Button look="plain" onPress={cancelPicking}>{t`Cancel`}</Button>
+      <Button variant="plain" onPress={cancelPicking}>{t`Cancel`}</Button>
       {asking === "parallel" && (
         <AskName
           title={t`Run in parallel`}
           initial={parallelName()}
-          yes={t`Run in parallel`}
+          confirmLabel={t`Run in parallel`}
           taken={actionNames(doc)}
-          onYes={(name) => void makeParallel(name, ids)}
+          onConfirm={(name) => void makeParallel(name, ids)}
           onClose={() => setAsking("")}
         />
       )}
@@ -73,9 +73,9 @@ export default function PickingBanner() {
           title={t`Make a function`}
           label={t`Name of the function`}
           initial={suggestedName(doc, ids)}
-          yes={t`Make a function`}
+          confirmLabel={t`Make a function`}
           taken={functionNames(doc)}
-          onYes={(name) => void makeFunction(name, ids)}
+          onConfirm={(name) => void makeFunction(name, ids)}
           onClose={() => setAsking("")}
         />
       )}

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { Button as AriaButton } from "react-aria-components";
 import { scopeOf } from "../../store/scope";
-import { show, useEditor } from "../../store/store";
+import { showFunction, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { FunctionMenu } from "./FunctionMenu";
 import "./functions.css";
@@ -15,14 +15,14 @@ export default function ScopeBar() {
   const crumbs = [t`Program`, ...path.map((id) => doc.functions[id]?.name ?? "")];
   return (
     <nav className="scope-bar" aria-label={t`Open function`}>
-      <Button look="plain" icon="left" aria-label={t`Back`} onPress={() => show(path.slice(0, -1))} />
+      <Button variant="plain" icon="left" aria-label={t`Back`} onPress={() => showFunction(path.slice(0, -1))} />
       <ol>
         {crumbs.map((name, n) => (
           <li key={`${n}/${name}`}>
             {n === path.length ? (
               <strong aria-current="page">{name}</strong>
             ) : (
-              <AriaButton className="crumb" onPress={() => show(path.slice(0, n))}>
+              <AriaButton className="crumb" onPress={() => showFunction(path.slice(0, n))}>
                 {name}
               </AriaButton>
             )}

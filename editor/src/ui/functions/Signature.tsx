@@ -21,7 +21,7 @@ import type { ActionParameter } from "../../protocol/types";
 import { scopeOf } from "../../store/scope";
 import type { OpenDocument, OpenFunction } from "../../store/state";
 import { select, useEditor } from "../../store/store";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { ValueField } from "../program/ValueField";
 import type { Section } from "../workplace/section";
@@ -36,12 +36,12 @@ const Signature: Section["Body"] = ({ selection: { id } }) => {
   const why = useEditor((state) => notEditable(state, "AddFunctionParameter"));
   const open = doc?.functions[scopeOf(doc)];
   if (!doc || !open) return null;
-  if (id === END) return <Returned doc={doc} open={open} why={why} />;
-  return id === START ? <Taken open={open} why={why} /> : null;
+  if (id === END) return <FunctionResults doc={doc} open={open} why={why} />;
+  return id === START ? <FunctionParameters open={open} why={why} /> : null;
 };
 export default Signature;
 
-function Taken({ open, why }: { open: OpenFunction; why: string }) {
+function FunctionParameters({ open, why }: { open: OpenFunction; why: string }) {
   const [problem, setProblem] = useState("");
   return (
     <>
@@ -66,7 +66,7 @@ function Taken({ open, why }: { open: OpenFunction; why: string }) {
 }
 
 /** Set the type of a parameter to the enumeration of an action, and use it there. Return why it was refused. */
-const pass = async (name: string, { action, parameter, type, json }: EnumerationUse): Promise<string> =>
+const passOn = async (name: string, { action, parameter, type, json }: EnumerationUse): Promise<string> =>
   (await updateFunctionParameter(name, { type }, json)) ||
   setParameter(action, { name: parameter, type: PASSED_ON, value: JSON.stringify(name) });
 
@@ -90,14 +90,14 @@ function Parameter({ open, parameter, why }: { open: OpenFunction; parameter: Ac
         onSet={(json) => updateFunctionParameter(name, { new_name: JSON.parse(json) as string })}
       >
         <Button
-          look="plain"
+          variant="plain"
           icon="close"
           aria-label={t`Remove ${name}`}
           why={why || used}
           onPress={() => void removeFunctionParameter(name)}
         />
       </ValueField>
-      <Pick
+      <SelectField
         label={t`Type`}
         value={type}
         choices={[
@@ -107,7 +107,7 @@ function Parameter({ open, parameter, why }: { open: OpenFunction; parameter: Ac
         isDisabled={why !== "" || used !== ""}
         onChange={(wanted) => {
           const enumeration = taken[Number(wanted)];
-          void (enumeration ? pass(name, enumeration) : updateFunctionParameter(name, { type: wanted })).then(
+          void (enumeration ? passOn(name, enumeration) : updateFunctionParameter(name, { type: wanted })).then(
             setProblem,
           );
         }}
@@ -129,7 +129,7 @@ function Parameter({ open, parameter, why }: { open: OpenFunction; parameter: Ac
   );
 }
 
-function Returned({ doc, open, why }: { doc: OpenDocument; open: OpenFunction; why: string }) {
+function FunctionResults({ doc, open, why }: { doc: OpenDocument; open: OpenFunction; why: string }) {
   const id = useId();
   const free = freeResults(doc, open);
   const calls = callsOf(doc, open.id).map((each) => each.action.name);
@@ -144,7 +144,7 @@ function Returned({ doc, open, why }: { doc: OpenDocument; open: OpenFunction; w
           return (
             <li key={link}>
               <Button
-                look="plain"
+                variant="plain"
                 className="next-step"
                 onPress={() => select({ kind: "action", id: link.split("/")[0] ?? "" })}
               >
@@ -152,7 +152,7 @@ function Returned({ doc, open, why }: { doc: OpenDocument; open: OpenFunction; w
                 <span className="quiet small">{typeName(type)}</span>
               </Button>
               <Button
-                look="plain"
+                variant="plain"
                 icon="close"
                 aria-label={t`Remove ${result?.name ?? ""}`}
                 why={why}

@@ -67,10 +67,10 @@ export function Gantt({ name, trace, summary, span: visible }: GanttProps) {
       <figcaption>
         <span>{name}</span>
         <span className="gantt-zoom">
-          <Button look="plain" aria-label={t`Zoom out`} isDisabled={whole <= view.width} onPress={() => zoomBy(0.5)}>
+          <Button variant="plain" aria-label={t`Zoom out`} isDisabled={whole <= view.width} onPress={() => zoomBy(0.5)}>
             −
           </Button>
-          <Button look="plain" aria-label={t`Zoom in`} isDisabled={zoom >= MAX_ZOOM} onPress={() => zoomBy(2)}>
+          <Button variant="plain" aria-label={t`Zoom in`} isDisabled={zoom >= MAX_ZOOM} onPress={() => zoomBy(2)}>
             +
           </Button>
         </span>

@@ -83,7 +83,7 @@ export default function HeldCard({ held }: { held: HeldData }) {
             />
           ))}
           <Choice
-            look="danger"
+            variant="danger"
             text={t`End the program`}
             hint={t`All devices are stopped.`}
             why={why}
@@ -100,11 +100,11 @@ interface ChoiceProps {
   text: string;
   hint: string;
   why: string;
-  look?: "primary" | "danger";
+  variant?: "primary" | "danger";
   act: () => unknown;
 }
 
-function Choice({ text, hint, why, look, act }: ChoiceProps) {
+function Choice({ text, hint, why, variant, act }: ChoiceProps) {
   const [busy, setBusy] = useState(false);
   const press = async () => {
     setBusy(true);
@@ -113,7 +113,7 @@ function Choice({ text, hint, why, look, act }: ChoiceProps) {
   };
   return (
     <div>
-      <Button look={look ?? ""} why={why} isDisabled={busy} onPress={() => void press()}>
+      <Button variant={variant ?? ""} why={why} isDisabled={busy} onPress={() => void press()}>
         {text}
       </Button>
       <p className="small">{hint}</p>
@@ -130,7 +130,7 @@ function Retry({ held, why }: { held: HeldData; why: string }) {
   return (
     <>
       <Choice
-        look="primary"
+        variant="primary"
         text={held.before ? t`Continue` : t`Try again`}
         hint={
           held.before && LOST.includes(held.kind)
@@ -143,8 +143,8 @@ function Retry({ held, why }: { held: HeldData; why: string }) {
       {asking && (
         <Confirm
           title={t`Try ${action} again?`}
-          yes={t`Try again`}
-          onYes={() => void retry()}
+          confirmLabel={t`Try again`}
+          onConfirm={() => void retry()}
           onClose={() => setAsking(false)}
         >
           <p>
@@ -273,7 +273,7 @@ function ResultForm({ held, onClose }: { held: HeldData; onClose: () => void }) 
       )}
       <div className="row">
         <Button
-          look="primary"
+          variant="primary"
           why={missing ? t`Enter all results first.` : whyUnavailable(state, "DecideHeld")}
           onPress={() => void send()}
         >

@@ -5,14 +5,14 @@ import { useRef, useState } from "react";
 import * as documents from "../../commands/documents";
 import { downloadPackage } from "../../commands/packages";
 import { runPackage } from "../../commands/run";
-import { keepOwnPicture } from "../../commands/thumbnail";
+import { storeOwnPicture } from "../../commands/thumbnail";
 import { storeGeneralState } from "../../commands/viewstate";
 import { ago } from "../../formats";
 import type { Entry } from "../../home/entries";
 import type { Requests, Run } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
-import { notify, now, useEditor } from "../../store/store";
+import { getState, notify, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { AskName, More } from "../kit/lazyControls";
@@ -25,8 +25,8 @@ import { Problems } from "./Problems";
 import { isTemplate, storeOpened, storeTemplate } from "./recent";
 import { Thumbnail } from "./Thumbnail";
 
-type ActionCommands = "open" | "copy" | "rename" | "describe" | "remove";
-const DO: Record<Entry["kind"], Partial<Record<ActionCommands, keyof Requests>>> = {
+type Command = "open" | "copy" | "rename" | "describe" | "remove";
+const REQUESTS: Record<Entry["kind"], Partial<Record<Command, keyof Requests>>> = {
   scene: {
     open: "OpenScene",
     copy: "CopyScene",
@@ -62,10 +62,10 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   const owner = useEditor((state) => state.locks[id]);
   const isFavorite = useEditor((state) => favoritesOf(state).has(id));
   const running = useEditor(isRunning);
-  const why = (what: ActionCommands) => {
-    const request = DO[kind][what];
-    if (owner && owner !== connection.user && what !== "open" && what !== "copy") return t`In use by ${owner}.`;
-    return request ? whyUnavailable({ ...now(), connection }, request) : "";
+  const why = (command: Command) => {
+    const request = REQUESTS[kind][command];
+    if (owner && owner !== connection.user && command !== "open" && command !== "copy") return t`In use by ${owner}.`;
+    return request ? whyUnavailable({ ...getState(), connection }, request) : "";
   };
   const whyOpen = why("open") || (running ? t`Stop the program first.` : "");
   const whyThis = whyOpen || (problems.length > 0 ? t`Fix its problems first, then open it.` : "");
@@ -76,7 +76,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   const own = useEditor((state) => state.thumbnails[id]?.own ?? false);
   const picture = useRef<HTMLInputElement>(null);
   const storePicture = (file: File | null) =>
-    void keepOwnPicture(id, file).then((wrong) => wrong && notify("error", wrong));
+    void storeOwnPicture(id, file).then((wrong) => wrong && notify("error", wrong));
   const open = (paused = false) => {
     if (kind === "package") storeOpened(id);
     void (kind === "scene"
@@ -86,7 +86,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
         : runPackage(id, paused));
   };
   const star = () => {
-    const others = [...favoritesOf(now())].filter((each) => each !== id);
+    const others = [...favoritesOf(getState())].filter((each) => each !== id);
     storeGeneralState({ stars: isFavorite ? others : [...others, id] });
   };
   const close = () => setDoing("");
@@ -96,12 +96,12 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           {
             id: "project",
             label: t`New project…`,
-            not: whyUnavailable({ ...now(), connection }, "NewProject"),
+            why: whyUnavailable({ ...getState(), connection }, "NewProject"),
             act: () => onProject(id),
           },
         ]
       : []),
-    ...(kind === "package" ? [{ id: "paused", label: t`Start paused`, not: whyOpen, act: () => open(true) }] : []),
+    ...(kind === "package" ? [{ id: "paused", label: t`Start paused`, why: whyOpen, act: () => open(true) }] : []),
     ...(kind === "package"
       ? [
           {
@@ -111,12 +111,12 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           },
         ]
       : [
-          { id: "copy", label: t`Duplicate…`, not: why("copy"), act: () => setDoing("copy") },
-          { id: "describe", label: t`Describe…`, not: why("describe"), act: () => setDoing("describe") },
+          { id: "copy", label: t`Duplicate…`, why: why("copy"), act: () => setDoing("copy") },
+          { id: "describe", label: t`Describe…`, why: why("describe"), act: () => setDoing("describe") },
           {
             id: "picture",
             label: t`Choose picture…`,
-            not: why("describe"),
+            why: why("describe"),
             act: () => picture.current?.click(),
           },
           ...(own
@@ -124,7 +124,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
                 {
                   id: "view",
                   label: t`Use the 3D view as picture`,
-                  not: why("describe"),
+                  why: why("describe"),
                   act: () => storePicture(null),
                 },
               ]
@@ -132,12 +132,12 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           {
             id: "template",
             label: template ? t`Remove from templates` : t`Use as a template`,
-            not: why("describe"),
+            why: why("describe"),
             act: () => storeTemplate(id, !template),
           },
         ]),
-    { id: "rename", label: t`Rename…`, not: why("rename"), act: () => setDoing("rename") },
-    { id: "remove", label: t`Delete…`, not: why("remove"), act: () => setDoing("remove") },
+    { id: "rename", label: t`Rename…`, why: why("rename"), act: () => setDoing("rename") },
+    { id: "remove", label: t`Delete…`, why: why("remove"), act: () => setDoing("remove") },
   ];
   return (
     <li className="card" data-marked={marked} data-id={id}>
@@ -172,7 +172,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
             <h2>{name}</h2>
           )}
           <Button
-            look="plain"
+            variant="plain"
             className="star"
             aria-pressed={isFavorite}
             aria-label={isFavorite ? t`Remove ${name} from favorites` : t`Add ${name} to favorites`}
@@ -212,7 +212,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
       </div>
       <div className="card-actions">
         <Button
-          look="primary"
+          variant="primary"
           icon={kind === "package" ? "play" : undefined}
           why={whyThis}
           onPress={() => open()}
@@ -228,9 +228,9 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           title={t`Duplicate ${name}`}
           initial={t`${name} copy`}
           taken={taken}
-          yes={t`Duplicate`}
+          confirmLabel={t`Duplicate`}
           onClose={close}
-          onYes={(to) =>
+          onConfirm={(to) =>
             void (kind === "scene" ? documents.duplicateScene(id, to) : documents.duplicateProject(id, to))
           }
         />
@@ -257,7 +257,7 @@ function Related({
 }) {
   if (kind === "scene") {
     return projects ? (
-      <Button look="plain" aria-label={t`Projects on ${name}`} onPress={() => onRelated("project", name)}>
+      <Button variant="plain" aria-label={t`Projects on ${name}`} onPress={() => onRelated("project", name)}>
         {t`Projects`}
       </Button>
     ) : null;
@@ -266,7 +266,7 @@ function Related({
   const to = kind === "project" ? ("scene" as const) : ("project" as const);
   return (
     <Button
-      look="plain"
+      variant="plain"
       aria-label={to === "scene" ? t`Scene of ${name}` : t`Project of ${name}`}
       onPress={() => onRelated(to, from.name)}
     >

@@ -17,10 +17,10 @@ export function Deleting({ entry: { kind, id, name }, onClose }: { entry: Entry;
   return (
     <Confirm
       title={t`Delete ${name}?`}
-      yes={t`Delete`}
-      not={needing.length > 0 ? t`Delete its projects first.` : ""}
+      confirmLabel={t`Delete`}
+      why={needing.length > 0 ? t`Delete its projects first.` : ""}
       onClose={onClose}
-      onYes={() => void DELETE[kind](id)}
+      onConfirm={() => void DELETE[kind](id)}
     >
       {needing.length > 0 ? (
         <>

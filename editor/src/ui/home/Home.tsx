@@ -67,7 +67,7 @@ export function Home() {
         <CellName />
         <h1>{t`Workplace`}</h1>
         <Button
-          look="plain"
+          variant="plain"
           icon="play"
           aria-label={t`Operator`}
           className="to-operator"
@@ -113,13 +113,13 @@ export function Home() {
             <span aria-hidden="true">{onlyStars ? "★" : "☆"}</span>
           </Button>
           {tab === "scenes" && (
-            <Button look="primary" icon="plus" why={noScene} onPress={() => setAsking("scene")}>
+            <Button variant="primary" icon="plus" why={noScene} onPress={() => setAsking("scene")}>
               {t`New scene`}
             </Button>
           )}
           {tab === "projects" && (
             <Button
-              look="primary"
+              variant="primary"
               icon="plus"
               why={noProject}
               onPress={() => {

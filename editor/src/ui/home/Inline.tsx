@@ -51,8 +51,8 @@ export function Inline({ label, value, taken = [], many = false, onSave, onClose
       <RefusedText>{problem || refused}</RefusedText>
       <div className="actions">
         <Button onPress={onClose}>{t`Cancel`}</Button>
-        <Button look="primary" type="submit" isDisabled={busy || problem !== "" || (!many && !clean)}>
-          {t`Keep`}
+        <Button variant="primary" type="submit" isDisabled={busy || problem !== "" || (!many && !clean)}>
+          {t`Save`}
         </Button>
       </div>
     </form>

@@ -19,9 +19,9 @@ export function NewProject({ initial = "", onClose }: { initial?: string; onClos
   return (
     <AskName
       title={t`New project`}
-      yes={t`Create`}
+      confirmLabel={t`Create`}
       taken={projects.map((each) => each.name)}
-      onYes={make}
+      onConfirm={make}
       onClose={onClose}
     >
       <StartFrom of={projects} value={from} onChange={setFrom} />

@@ -14,9 +14,9 @@ export function NewScene({ onClose }: { onClose: () => void }) {
   return (
     <AskName
       title={t`New scene`}
-      yes={t`Create`}
+      confirmLabel={t`Create`}
       taken={scenes.map((each) => each.name)}
-      onYes={make}
+      onConfirm={make}
       onClose={onClose}
     >
       <StartFrom of={scenes} value={from} onChange={setFrom} />

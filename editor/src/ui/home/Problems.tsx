@@ -63,10 +63,10 @@ export function Problems({ entry: { kind, id, name, problems, explanations, from
       {faulty && (
         <Confirm
           title={t`Repair ${name}?`}
-          yes={t`Remove objects`}
-          not={faulty.length > 0 ? "" : t`No single object causes the problem. Import the scene again.`}
+          confirmLabel={t`Remove objects`}
+          why={faulty.length > 0 ? "" : t`No single object causes the problem. Import the scene again.`}
           onClose={() => setFaulty(null)}
-          onYes={() =>
+          onConfirm={() =>
             void removeObjects(id, name, faulty).then((wrong) =>
               wrong ? notify("error", wrong) : notify("info", t`${name} can be opened again.`),
             )

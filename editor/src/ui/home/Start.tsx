@@ -21,7 +21,7 @@ export function Start() {
       <section className="start-here" aria-label={t`Start`}>
         <p>{t`Create a workplace, add its devices, and program it.`}</p>
         <Button
-          look="primary"
+          variant="primary"
           icon="play"
           why={cannotAdd}
           onPress={() => void documents.startEmpty(t`Workplace`, t`Program`)}
@@ -35,7 +35,7 @@ export function Start() {
   return (
     <section className="start-here" aria-label={t`Start`}>
       {proposal.kind === "continue" ? (
-        <Button look="primary" icon="play" className="wraps" onPress={() => void open()}>
+        <Button variant="primary" icon="play" className="wraps" onPress={() => void open()}>
           {t`Continue with ${name}`}
         </Button>
       ) : (
@@ -47,7 +47,7 @@ export function Start() {
             })}
           </p>
           <Button
-            look="primary"
+            variant="primary"
             icon="play"
             onPress={() => {
               setUi({ tour: 0 });

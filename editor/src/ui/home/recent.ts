@@ -4,7 +4,7 @@ import { storeGeneralState } from "../../commands/viewstate";
 import { idsToForget, type RecentIds, recentIds } from "../../home/opened";
 import { memoized } from "../../store/memo";
 import type { State } from "../../store/state";
-import { now } from "../../store/store";
+import { getState } from "../../store/store";
 
 const openedMemo = memoized(recentIds);
 
@@ -15,7 +15,7 @@ export function recentOf(state: State): RecentIds {
 
 /** Store that the user opened a document; each has its own key, so that two devices do not conflict. */
 export function storeOpened(id: string): void {
-  const forgotten = idsToForget(recentOf(now()), id).map((each) => [`opened/${each}`, null] as const);
+  const forgotten = idsToForget(recentOf(getState()), id).map((each) => [`opened/${each}`, null] as const);
   storeGeneralState({ ...Object.fromEntries(forgotten), [`opened/${id}`]: Date.now() });
 }
 

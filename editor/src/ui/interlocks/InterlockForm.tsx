@@ -8,7 +8,7 @@ import { words } from "../../program/naming";
 import type { Interlock, Need, Position, SceneObject } from "../../protocol/types";
 import { useEditor } from "../../store/store";
 import { Field } from "../kit/Field";
-import { Amount, OneOf, OnOff, Pick } from "../kit/fields";
+import { NumberField, SelectField, SwitchField, ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { NeedFields } from "./NeedFields";
@@ -41,7 +41,7 @@ export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onD
     <>
       <div className="interlock-form">
         <Field label={t`Name`} value={draft.name} onChange={(name) => change({ name })} maxLength={200} />
-        <OneOf
+        <ToggleGroup
           label={t`Applies to`}
           value={draft.on}
           choices={[
@@ -50,7 +50,7 @@ export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onD
           ]}
           onChange={(on) => change({ on, object_id: "", actions: [], retract: [] })}
         />
-        <Pick
+        <SelectField
           label={zone ? t`Body of the zone` : t`Device`}
           value={draft.object_id}
           choices={choicesOf(zone ? bodies : devices)}
@@ -91,11 +91,11 @@ export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onD
           </Button>
         </fieldset>
         {draft.needs.length > 0 && (
-          <OnOff isSelected={draft.during} onChange={(during) => change({ during })}>
+          <SwitchField isSelected={draft.during} onChange={(during) => change({ during })}>
             {zone ? t`Needed as long as a robot moves in the zone` : t`Needed until the action has ended`}
-          </OnOff>
+          </SwitchField>
         )}
-        <OneOf
+        <ToggleGroup
           label={t`While it is not met`}
           value={draft.else}
           choices={[
@@ -105,7 +105,7 @@ export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onD
           onChange={(value) => change({ else: value })}
         />
         {draft.else === "wait" && (
-          <Amount
+          <NumberField
             label={t`Wait at most`}
             unit="s"
             value={draft.within}
@@ -121,7 +121,7 @@ export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onD
       <div className="actions">
         <Button onPress={onDone}>{t`Cancel`}</Button>
         <Button
-          look="primary"
+          variant="primary"
           isDisabled={busy}
           why={draft.object_id ? "" : zone ? t`Select the body of the zone first.` : t`Select the device first.`}
           onPress={() => void save()}
@@ -157,7 +157,7 @@ function RetractPath({ path, onChange }: RetractPathProps) {
       {path.map((point, n) => (
         <div key={n} className="need">
           {(["x", "y", "z"] as const).map((axis) => (
-            <Amount
+            <NumberField
               key={axis}
               label={`${n + 1} ${axis.toUpperCase()}`}
               unit="mm"
@@ -189,7 +189,7 @@ function Actions({ draft, names, onChange }: ActionsProps) {
   const [some, setSome] = useState(draft.actions.length > 0);
   return (
     <>
-      <OneOf
+      <ToggleGroup
         label={t`Actions`}
         value={some ? "some" : "all"}
         choices={[
@@ -203,7 +203,7 @@ function Actions({ draft, names, onChange }: ActionsProps) {
       />
       {some &&
         names.map((each) => (
-          <OnOff
+          <SwitchField
             key={each}
             isSelected={draft.actions.includes(each)}
             onChange={(on) =>
@@ -211,7 +211,7 @@ function Actions({ draft, names, onChange }: ActionsProps) {
             }
           >
             {words(each)}
-          </OnOff>
+          </SwitchField>
         ))}
     </>
   );

@@ -6,7 +6,7 @@ import { useState } from "react";
 import { deleteInterlock, freeInterlockName, notChangeable } from "../../commands/interlocks";
 import type { Interlock, InterlockCondition, InterlockState } from "../../protocol/types";
 import { useEditor } from "../../store/store";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Button, Waiting } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
 import { RefusedText, useRefusal } from "../points/Refusal";
@@ -32,9 +32,9 @@ export default function Interlocks({ onClose }: { onClose: () => void }) {
   if (editing) {
     const back = () => setEditing(null);
     return (
-      <Window title={editing.id ? t`Change interlock` : t`New interlock`} onClose={back}>
+      <ModalDialog title={editing.id ? t`Change interlock` : t`New interlock`} onClose={back}>
         <InterlockForm interlock={editing} onDone={back} />
-      </Window>
+      </ModalDialog>
     );
   }
   const add = () =>
@@ -51,7 +51,7 @@ export default function Interlocks({ onClose }: { onClose: () => void }) {
       retract: [],
     });
   return (
-    <Window title={t`Interlocks and zones`} onClose={onClose}>
+    <ModalDialog title={t`Interlocks and zones`} onClose={onClose}>
       <p className="quiet small">{t`They help to avoid damage. They are not a safety function.`}</p>
       {!open && <p>{t`No scene or project is open.`}</p>}
       {open && !found && <Waiting>{t`Loading…`}</Waiting>}
@@ -75,21 +75,21 @@ export default function Interlocks({ onClose }: { onClose: () => void }) {
         <Button icon="plus" why={why} onPress={add}>
           {t`Add interlock`}
         </Button>
-        <Button look="primary" onPress={onClose}>
+        <Button variant="primary" onPress={onClose}>
           {t`Close`}
         </Button>
       </div>
       {deleting && (
         <Confirm
           title={t`Delete ${deleting.name}?`}
-          yes={t`Delete`}
+          confirmLabel={t`Delete`}
           onClose={() => setDeleting(null)}
-          onYes={() => void ask(deleteInterlock(deleting.id))}
+          onConfirm={() => void ask(deleteInterlock(deleting.id))}
         >
           <p>{t`Its conditions are not checked any more. Undo restores it.`}</p>
         </Confirm>
       )}
-    </Window>
+    </ModalDialog>
   );
 }
 

@@ -3,12 +3,12 @@
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { holdJog } from "../../commands/holdToRun";
-import { type Chosen, featuresOf, notReady } from "../../commands/robot";
+import { featuresOf, notReady, type RobotSelection } from "../../commands/robot";
 import { useEditor } from "../../store/store";
 import { HoldButton } from "../robot/HoldButton";
 import { useInterlocks } from "./useInterlocks";
 
-export function LeaveZone({ chosen }: { chosen: Chosen }) {
+export function LeaveZone({ chosen }: { chosen: RobotSelection }) {
   const found = useInterlocks();
   const objects = useEditor((state) => state.doc?.objects);
   const why = useEditor((state) => notReady(state, chosen, "JogRobot"));

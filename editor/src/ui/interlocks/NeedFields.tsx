@@ -6,7 +6,7 @@ import { words } from "../../program/naming";
 import type { Need, ObservationMeta, Operator, SceneObject } from "../../protocol/types";
 import { useEditor } from "../../store/store";
 import { Field } from "../kit/Field";
-import { Amount, OneOf, Pick } from "../kit/fields";
+import { NumberField, SelectField, ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 
 interface Props {
@@ -26,13 +26,13 @@ export function NeedFields({ need, observed, onChange, onRemove }: Props) {
   const points = Object.keys(values ?? {});
   return (
     <div className="need">
-      <Pick
+      <SelectField
         label={t`Device`}
         value={need.object_id}
         choices={observed.map((each): [string, string] => [each.id ?? "", each.name])}
         onChange={(id) => onChange(needFor(id, typeOf(id)?.observations?.[0]))}
       />
-      <Pick
+      <SelectField
         label={t`Value`}
         value={need.observation}
         choices={observations.map((each): [string, string] => [each.name, words(each.name)])}
@@ -48,7 +48,7 @@ export function NeedFields({ need, observed, onChange, onRemove }: Props) {
       />
       {observation?.of_point &&
         (points.length > 0 ? (
-          <Pick
+          <SelectField
             label={t`Point`}
             value={need.point ?? ""}
             choices={[
@@ -78,7 +78,7 @@ function Compared({ need, observation, onChange }: ComparedProps) {
   const value = need.value ?? "true";
   if (observation?.members)
     return (
-      <Pick
+      <SelectField
         label={t`Must be`}
         value={value}
         choices={observation.members.map((each): [string, string] => [each, words(each.replaceAll('"', ""))])}
@@ -95,7 +95,7 @@ function Compared({ need, observation, onChange }: ComparedProps) {
       />
     );
   return (
-    <OneOf
+    <ToggleGroup
       label={t`Must be`}
       value={value}
       choices={[
@@ -116,7 +116,7 @@ function Limits({ need, unit, onChange }: { need: Need; unit: string; onChange: 
   };
   return (
     <>
-      <OneOf
+      <ToggleGroup
         label={t`Must be`}
         value={range ? "[]" : need.operator === ">=" ? ">=" : "<="}
         choices={[
@@ -126,7 +126,7 @@ function Limits({ need, unit, onChange }: { need: Need; unit: string; onChange: 
         ]}
         onChange={choose}
       />
-      <Amount
+      <NumberField
         label={range ? t`From` : t`Limit`}
         unit={unit}
         digits={3}
@@ -134,7 +134,7 @@ function Limits({ need, unit, onChange }: { need: Need; unit: string; onChange: 
         onChange={(value) => onChange({ ...need, value: String(value) })}
       />
       {range && (
-        <Amount
+        <NumberField
           label={t`To`}
           unit={unit}
           digits={3}

@@ -4,7 +4,7 @@ import { useEffect, useState } from "react";
 import { translate } from "../../i18n/serverMessages";
 import type { Interlock, InterlockState } from "../../protocol/types";
 import { call, serves } from "../../session/connection";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 
 export interface Found {
   interlocks: Interlock[];
@@ -23,7 +23,7 @@ export function useInterlocks(): Found | null {
   useEffect(() => {
     if (!ready || !scene || !serves("ListInterlocks")) return;
     let current = true;
-    const { runtime } = now();
+    const { runtime } = getState();
     runtime.takeInterlocks ??= new Set();
     const listeners = runtime.takeInterlocks;
     const take: Parameters<typeof listeners.add>[0] = (event) => {

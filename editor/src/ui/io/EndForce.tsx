@@ -21,7 +21,12 @@ export function EndForce({ force }: { force: ForcedPoint }) {
         {t`End force`}
       </Button>
       {asking && (
-        <Confirm title={t`End the force of ${output}?`} yes={t`End force`} onClose={() => setAsking(false)} onYes={end}>
+        <Confirm
+          title={t`End the force of ${output}?`}
+          confirmLabel={t`End force`}
+          onClose={() => setAsking(false)}
+          onConfirm={end}
+        >
           <p>{t`${user} forces it. It returns to its previous value, and connected devices may move.`}</p>
         </Confirm>
       )}

@@ -7,7 +7,7 @@ import { refusal } from "../../commands/requests";
 import { numberFrom } from "../../formats";
 import { shownUnit } from "../../program/values";
 import type { LivePoint } from "../../protocol/types";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Field } from "../kit/Field";
 import { Button } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
@@ -32,7 +32,7 @@ export function ForceForm({ objectId, device, point, onClose }: Props) {
     if (await ask(refusal(work))) onClose();
   };
   return (
-    <Window title={t`Force ${output}`} onClose={onClose}>
+    <ModalDialog title={t`Force ${output}`} onClose={onClose}>
       <p>{t`It is ${present} now. The device acts at once. Make sure that nobody is in danger.`}</p>
       <p className="quiet small">
         {t`The force ends when you end it, log off, or this device loses its connection.`}{" "}
@@ -52,17 +52,17 @@ export function ForceForm({ objectId, device, point, onClose }: Props) {
       <div className="actions io-force">
         <Button onPress={onClose}>{t`Cancel`}</Button>
         {point.force === "analog" ? (
-          <Button look="danger" isDisabled={busy || !Number.isFinite(number)} onPress={() => void force(number)}>
+          <Button variant="danger" isDisabled={busy || !Number.isFinite(number)} onPress={() => void force(number)}>
             {t`Force`}
           </Button>
         ) : (
           [false, true].map((value) => (
-            <Button key={String(value)} look="danger" isDisabled={busy} onPress={() => void force(value)}>
+            <Button key={String(value)} variant="danger" isDisabled={busy} onPress={() => void force(value)}>
               {value ? t`Force on` : t`Force off`}
             </Button>
           ))
         )}
       </div>
-    </Window>
+    </ModalDialog>
   );
 }

@@ -7,8 +7,8 @@ import { exportPoint, findPoint, type HistoryPoint, loadSummary, type PointSumma
 import { refusal, sentence } from "../../commands/requests";
 import { clock, decimal } from "../../formats";
 import { shownUnit } from "../../program/values";
-import { Window } from "../kit/dialogs";
-import { OneOf } from "../kit/fields";
+import { ModalDialog } from "../kit/dialogs";
+import { ToggleGroup } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { useTheme } from "../settings/Settings";
@@ -71,9 +71,9 @@ export default function PointHistory({ objectId, device, id, name, unit, onClose
   const output = `${device}: ${name}`;
   const save = () => exportPoint(point?.number ?? 0, SPANS[span], `${device} ${name}`);
   return (
-    <Window title={t`History of ${output}`} onClose={onClose}>
+    <ModalDialog title={t`History of ${output}`} onClose={onClose}>
       <div className="point-history">
-        <OneOf
+        <ToggleGroup
           label={t`Period`}
           quiet
           value={span}
@@ -92,11 +92,11 @@ export default function PointHistory({ objectId, device, id, name, unit, onClose
         <Button icon="save" isDisabled={busy || !summary} onPress={() => void ask(refusal(save))}>
           {t`Export CSV`}
         </Button>
-        <Button look="primary" onPress={onClose} autoFocus>
+        <Button variant="primary" onPress={onClose} autoFocus>
           {t`Close`}
         </Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }
 

@@ -9,9 +9,9 @@ import type { ForcedPoint, LivePoint, PointQuality, PointUse } from "../../proto
 import { whyUnavailable } from "../../store/permissions";
 import { derivesFrom, isLive, isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { useCellName } from "../cell/CellName";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
@@ -47,7 +47,7 @@ interface Forcing {
 }
 
 /** A point whose history is shown. */
-interface Past {
+interface HistoryTarget {
   objectId: string;
   device: string;
   id: string;
@@ -69,13 +69,13 @@ export default function Points() {
   const forces = useEditor((state) => state.forces);
   const why = useEditor(notForcible);
   const objects = Object.values(doc?.objects ?? {}).filter(
-    (each) => !derivesFrom(now(), each.type, "VirtualCollisionObject"),
+    (each) => !derivesFrom(getState(), each.type, "VirtualCollisionObject"),
   );
   const cell = useCellName();
   const [device, setDevice] = useState("");
   const [text, setText] = useState("");
   const [forcing, setForcing] = useState<Forcing | null>(null);
-  const [past, setPast] = useState<Past | null>(null);
+  const [historyOf, setHistoryOf] = useState<HistoryTarget | null>(null);
   const [recorded, setRecorded] = useState(false);
   useEffect(() => {
     if (connected) isRecording().then(setRecorded, () => setRecorded(false));
@@ -89,7 +89,7 @@ export default function Points() {
   return (
     <div className="io-page">
       <header className="bar">
-        <Button look="plain" icon="left" aria-label={t`Back`} onPress={closePoints} />
+        <Button variant="plain" icon="left" aria-label={t`Back`} onPress={closePoints} />
         {cell && <strong className="cell-name">{cell}</strong>}
         <h1>{t`Inputs and outputs`}</h1>
         <People />
@@ -101,7 +101,7 @@ export default function Points() {
               <Label className="hidden-but-read">{t`Search`}</Label>
               <Input placeholder={t`Search device or point`} />
             </SearchField>
-            <Pick
+            <SelectField
               label={t`Device`}
               value={device}
               choices={[["", t`All devices`], ...all.map((each) => [each.id, each.name] as const)]}
@@ -123,14 +123,14 @@ export default function Points() {
               forces={forces}
               why={why}
               onForce={setForcing}
-              onHistory={recorded ? setPast : undefined}
+              onHistory={recorded ? setHistoryOf : undefined}
             />
           ))}
       </main>
       {forcing && <ForceForm {...forcing} onClose={() => setForcing(null)} />}
-      {past && (
+      {historyOf && (
         <Suspense fallback={null}>
-          <PointHistory {...past} onClose={() => setPast(null)} />
+          <PointHistory {...historyOf} onClose={() => setHistoryOf(null)} />
         </Suspense>
       )}
       <Notices />
@@ -144,7 +144,7 @@ interface DeviceProps {
   why: string;
   onForce: (forcing: Forcing) => void;
   /** Undefined if the server records no history. */
-  onHistory: ((past: Past) => void) | undefined;
+  onHistory: ((past: HistoryTarget) => void) | undefined;
 }
 
 function Device({ device, forces, why, onForce, onHistory }: DeviceProps) {
@@ -204,7 +204,7 @@ const Row = memo(
           {force && <span className="tag warn">{t`forced by ${force.user}`}</span>}
         </span>
         {onHistory && (
-          <Button look="plain" aria-label={t`History of ${output}`} onPress={onHistory}>
+          <Button variant="plain" aria-label={t`History of ${output}`} onPress={onHistory}>
             {t`History`}
           </Button>
         )}

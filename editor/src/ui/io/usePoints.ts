@@ -5,7 +5,7 @@ import { inUserLanguage } from "../../i18n/serverMessages";
 import type { SceneObject } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { isLive } from "../../store/selectors";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { RATE, type Reported } from "./points";
 
 /** Time for which reports of devices are collected before they are drawn, ms. */
@@ -19,7 +19,7 @@ export function usePoints(objects: readonly SceneObject[]): ReadonlyMap<string, 
   const [, draw] = useState(0);
   useEffect(() => {
     if (!live || !ids) return;
-    const { runtime } = now();
+    const { runtime } = getState();
     const streamed = ids.split(",");
     let timer: ReturnType<typeof setTimeout> | undefined;
     runtime.takePoints = (data) => {

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import encodeQR from "qr";
 import { useEffect, useState } from "react";
-import { type Joining, loadInvitation } from "../../commands/invitation";
+import { type InvitationData, loadInvitation } from "../../commands/invitation";
 import { Waiting } from "../kit/kit";
 import "./invitation.css";
 
@@ -11,7 +11,7 @@ import "./invitation.css";
 const QUIET = 4;
 
 export function Invitation() {
-  const [joining, setJoining] = useState<Joining | null>(null);
+  const [joining, setJoining] = useState<InvitationData | null>(null);
   useEffect(() => {
     let over = false;
     void loadInvitation().then((found) => over || setJoining(found));

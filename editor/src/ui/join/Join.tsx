@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { LANGUAGES, type Language, useLanguage } from "../../i18n/catalogue";
 import { displayIn } from "../../session/language";
-import { peopleHere, remember, remembered } from "../../session/localStorage";
+import { recentUsers, remember, remembered } from "../../session/localStorage";
 import { theSession } from "../../session/session";
 import { useEditor } from "../../store/store";
 import { Field } from "../kit/Field";
@@ -16,9 +16,9 @@ export default function Join() {
   const [name, setName] = useState(() => remembered("name"));
   const [token, setToken] = useState(() => remembered("token"));
   const trying = status === "connecting" || status === "joining";
-  const [people] = useState(peopleHere);
-  const enter = (who: string) => {
-    const clean = who.trim();
+  const [people] = useState(recentUsers);
+  const enter = (user: string) => {
+    const clean = user.trim();
     if (!clean) return;
     setName(clean);
     remember("name", clean);
@@ -73,7 +73,7 @@ export default function Join() {
           </p>
         )}
         {trying && <Waiting>{reason ? t`${reason} Reconnecting…` : t`Connecting…`}</Waiting>}
-        <Button look="primary" type="submit" isDisabled={!name.trim() || status === "joining"}>
+        <Button variant="primary" type="submit" isDisabled={!name.trim() || status === "joining"}>
           {t`Join`}
         </Button>
         <LanguageChoice />
@@ -82,7 +82,7 @@ export default function Join() {
   );
 }
 
-/** The language before login. A user who has chosen one sees that after joining. */
+/** The language before login. After joining, the page uses the language that the user has chosen. */
 export function LanguageChoice() {
   const language = useLanguage();
   return (

@@ -7,7 +7,7 @@ import { Field } from "./Field";
 import { Button } from "./kit";
 import type { AskNameProps, ConfirmProps } from "./props";
 
-interface WindowProps {
+interface ModalDialogProps {
   title: string;
   onClose: () => void;
   children: ReactNode;
@@ -15,7 +15,7 @@ interface WindowProps {
 }
 
 /** A modal dialog. `onClose` is called by Escape and by a tap outside, too. */
-export function Window({ title, onClose, children, role = "dialog" }: WindowProps) {
+export function ModalDialog({ title, onClose, children, role = "dialog" }: ModalDialogProps) {
   return (
     <ModalOverlay isOpen isDismissable onOpenChange={(open) => open || onClose()} className="overlay">
       <Modal className="dialog">
@@ -31,26 +31,26 @@ export function Window({ title, onClose, children, role = "dialog" }: WindowProp
 }
 
 /** Ask for confirmation of an action that cannot be undone. */
-export function Confirm({ title, children, yes, not = "", onYes, onClose }: ConfirmProps) {
+export function Confirm({ title, children, confirmLabel, why = "", onConfirm, onClose }: ConfirmProps) {
   return (
-    <Window title={title} onClose={onClose} role="alertdialog">
+    <ModalDialog title={title} onClose={onClose} role="alertdialog">
       <div>{children}</div>
       <div className="actions">
         <Button onPress={onClose} autoFocus>
           {t`Cancel`}
         </Button>
         <Button
-          look="danger"
-          why={not}
+          variant="danger"
+          why={why}
           onPress={() => {
             onClose();
-            onYes();
+            onConfirm();
           }}
         >
-          {yes}
+          {confirmLabel}
         </Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }
 
@@ -59,10 +59,10 @@ export function AskName({
   title,
   label = t`Name`,
   initial = "",
-  yes,
+  confirmLabel,
   taken = [],
   children,
-  onYes,
+  onConfirm,
   onClose,
 }: AskNameProps) {
   const [name, setName] = useState(initial);
@@ -72,10 +72,10 @@ export function AskName({
     event.preventDefault();
     if (!clean || problem) return;
     onClose();
-    onYes(clean);
+    onConfirm(clean);
   };
   return (
-    <Window title={title} onClose={onClose}>
+    <ModalDialog title={title} onClose={onClose}>
       <form onSubmit={submit} className="ask-name">
         <Field
           label={label}
@@ -89,11 +89,11 @@ export function AskName({
         {children}
         <div className="actions">
           <Button onPress={onClose}>{t`Cancel`}</Button>
-          <Button look="primary" type="submit" isDisabled={!clean || problem !== ""}>
-            {yes}
+          <Button variant="primary" type="submit" isDisabled={!clean || problem !== ""}>
+            {confirmLabel}
           </Button>
         </div>
       </form>
-    </Window>
+    </ModalDialog>
   );
 }

@@ -6,7 +6,7 @@ import { Switch, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { fixed, normalised } from "../../formats";
 import "./fields.css";
 
-interface OneOfProps<T extends string> {
+interface ToggleGroupProps<T extends string> {
   label: string;
   value: T;
   choices: readonly (readonly [T, ReactNode])[];
@@ -16,7 +16,7 @@ interface OneOfProps<T extends string> {
 }
 
 /** A choice of one of a few options, as toggle buttons next to each other. */
-export function OneOf<T extends string>({ label, value, choices, onChange, quiet = false }: OneOfProps<T>) {
+export function ToggleGroup<T extends string>({ label, value, choices, onChange, quiet = false }: ToggleGroupProps<T>) {
   const id = useId();
   return (
     <div className="one-of">
@@ -44,7 +44,7 @@ export function OneOf<T extends string>({ label, value, choices, onChange, quiet
   );
 }
 
-interface PickProps {
+interface SelectFieldProps {
   label: string;
   value: string;
   choices: readonly (readonly [string, string])[];
@@ -53,7 +53,7 @@ interface PickProps {
 }
 
 /** A choice of one of many options, as a native select. */
-export function Pick({ label, value, choices, onChange, isDisabled = false }: PickProps) {
+export function SelectField({ label, value, choices, onChange, isDisabled = false }: SelectFieldProps) {
   const id = useId();
   return (
     <div className="field">
@@ -69,7 +69,7 @@ export function Pick({ label, value, choices, onChange, isDisabled = false }: Pi
   );
 }
 
-interface AmountProps {
+interface NumberFieldProps {
   label: string;
   unit: string;
   value: number;
@@ -84,7 +84,7 @@ interface AmountProps {
 }
 
 /** A number with its unit. `+5` adds to the present value, `-=5` subtracts; `-5` is that number. */
-export function Amount({
+export function NumberField({
   label,
   unit,
   value,
@@ -94,7 +94,7 @@ export function Amount({
   most = Infinity,
   step = 1,
   isDisabled = false,
-}: AmountProps) {
+}: NumberFieldProps) {
   const id = useId();
   const shown = fixed(value, digits);
   const [text, setText] = useState<string | null>(null);
@@ -160,7 +160,7 @@ export function parsed(text: string, value: number): number | null {
   return clean !== "" && Number.isFinite(Number(clean)) ? Number(clean) : null;
 }
 
-interface MoreOrLessProps {
+interface SliderFieldProps {
   label: string;
   value: number;
   least: number;
@@ -171,7 +171,7 @@ interface MoreOrLessProps {
   onEnd?: (value: number) => void;
 }
 
-export function MoreOrLess({ label, value, least, most, step, words, onChange, onEnd }: MoreOrLessProps) {
+export function SliderField({ label, value, least, most, step, words, onChange, onEnd }: SliderFieldProps) {
   const id = useId();
   const end = () => onEnd?.(value);
   return (
@@ -194,7 +194,7 @@ export function MoreOrLess({ label, value, least, most, step, words, onChange, o
   );
 }
 
-export function OnOff({
+export function SwitchField({
   children,
   isSelected,
   onChange,

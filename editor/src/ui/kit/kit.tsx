@@ -5,10 +5,10 @@ import type { ReactNode } from "react";
 import { Button as AriaButton, type ButtonProps } from "react-aria-components";
 import { notify } from "../../store/store";
 import { Icon, type IconName } from "./icons";
-import type { Look } from "./props";
+import type { Variant } from "./props";
 
 interface PlainButtonProps extends Omit<ButtonProps, "children" | "className"> {
-  look?: Look;
+  variant?: Variant;
   icon?: IconName;
   children?: ReactNode;
   className?: string;
@@ -16,14 +16,14 @@ interface PlainButtonProps extends Omit<ButtonProps, "children" | "className"> {
   why?: string;
 }
 
-export function Button({ look = "", icon, children, className, why = "", onPress, ...rest }: PlainButtonProps) {
+export function Button({ variant = "", icon, children, className, why = "", onPress, ...rest }: PlainButtonProps) {
   const press: ButtonProps["onPress"] = why ? () => notify("info", why) : onPress;
   return (
     <AriaButton
       {...rest}
       onPress={press}
       aria-disabled={why !== "" || undefined}
-      className={`button ${look} ${className ?? ""}`}
+      className={`button ${variant} ${className ?? ""}`}
     >
       {icon && <Icon name={icon} />}
       {children}

@@ -29,12 +29,12 @@ export function AskName(props: AskNameProps) {
 
 /** A button that opens a menu; if it is pressed before the menu is loaded, the menu opens as soon as it is. */
 export function More(props: MoreProps) {
-  const { label, icon = "more", children, look = "plain" } = props;
+  const { label, icon = "more", children, variant = "plain" } = props;
   const [pressed, setPressed] = useState(false);
   return (
     <Suspense
       fallback={
-        <Button look={look} icon={icon} aria-label={label} onPressStart={() => setPressed(true)}>
+        <Button variant={variant} icon={icon} aria-label={label} onPressStart={() => setPressed(true)}>
           {children}
         </Button>
       }

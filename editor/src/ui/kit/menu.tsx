@@ -14,13 +14,13 @@ export default function MoreMenu({
   choices,
   icon = "more",
   children,
-  look = "plain",
+  variant = "plain",
   defaultOpen,
 }: MoreMenuProps) {
-  const whyUnavailable = choices.filter((each) => each.not).map((each) => each.id);
+  const whyUnavailable = choices.filter((each) => each.why).map((each) => each.id);
   return (
     <MenuTrigger defaultOpen={defaultOpen}>
-      <Button look={look} icon={icon} aria-label={label}>
+      <Button variant={variant} icon={icon} aria-label={label}>
         {children}
       </Button>
       <Popover className="popover" boundaryElement={document.querySelector(".screen") ?? undefined}>
@@ -35,7 +35,7 @@ export default function MoreMenu({
               {each.icon && <Icon name={each.icon} />}
               <span>
                 {each.label}
-                {each.not && <span className="quiet small"> – {each.not}</span>}
+                {each.why && <span className="quiet small"> – {each.why}</span>}
               </span>
             </MenuItem>
           ))}

@@ -3,16 +3,16 @@
 import type { ReactNode } from "react";
 import type { IconName } from "./icons";
 
-export type Look = "" | "primary" | "plain" | "danger";
+export type Variant = "" | "primary" | "plain" | "danger";
 
 export interface ConfirmProps {
   title: string;
   children: ReactNode;
   /** Text of the button that confirms. */
-  yes: string;
+  confirmLabel: string;
   /** The reason why it is not possible now, a sentence. */
-  not?: string;
-  onYes: () => void;
+  why?: string;
+  onConfirm: () => void;
   onClose: () => void;
 }
 
@@ -20,11 +20,11 @@ export interface AskNameProps {
   title: string;
   label?: string;
   initial?: string;
-  yes: string;
+  confirmLabel: string;
   /** Existing names. */
   taken?: string[];
   children?: ReactNode;
-  onYes: (name: string) => void;
+  onConfirm: (name: string) => void;
   onClose: () => void;
 }
 
@@ -33,7 +33,7 @@ export interface Choice {
   label: string;
   icon?: IconName;
   /** Why it is not available. */
-  not?: string;
+  why?: string;
   act: () => void;
 }
 
@@ -42,5 +42,5 @@ export interface MoreProps {
   choices: Choice[];
   icon?: IconName;
   children?: ReactNode;
-  look?: Look;
+  variant?: Variant;
 }

@@ -50,11 +50,11 @@ export function Backups({ card, reload }: { card: DeviceCard; reload: () => Prom
               <Button why={offline} onPress={() => setOpened(opened === each.id ? "" : each.id)}>
                 {card.restores ? t`Compare and restore` : t`Compare`}
               </Button>
-              <Button look="plain" onPress={() => void ask(refusal(() => downloadBackup(card, each.id)))}>
+              <Button variant="plain" onPress={() => void ask(refusal(() => downloadBackup(card, each.id)))}>
                 {t`Save as file`}
               </Button>
               <Button
-                look="plain"
+                variant="plain"
                 icon="close"
                 aria-label={t`Delete the backup of ${dateAndTime(each.at)}`}
                 onPress={() => setDeleting(each)}
@@ -92,9 +92,9 @@ export function Backups({ card, reload }: { card: DeviceCard; reload: () => Prom
       {deleting && (
         <Confirm
           title={t`Delete this backup?`}
-          yes={t`Delete`}
+          confirmLabel={t`Delete`}
           onClose={() => setDeleting(null)}
-          onYes={() => void send(() => call("DeleteParameterBackup", { object_id, backup_id: deleting.id }))}
+          onConfirm={() => void send(() => call("DeleteParameterBackup", { object_id, backup_id: deleting.id }))}
         >
           <p>{dateAndTime(deleting.at)}</p>
         </Confirm>

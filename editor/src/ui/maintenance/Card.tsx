@@ -59,7 +59,7 @@ export function Card({ card, reload, onReplace }: Props) {
               : t`It executes no commands until a technician has confirmed it. Call a technician.`}
           </span>
           {technician && (
-            <Button look="primary" onPress={onReplace}>
+            <Button variant="primary" onPress={onReplace}>
               {t`Check and confirm…`}
             </Button>
           )}

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { differenceOf } from "../../commands/maintenance";
 import { useEditor } from "../../store/store";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Button, Waiting } from "../kit/kit";
 import { stateName, TONE } from "../workplace/sections/about";
 import { Card } from "./Card";
@@ -20,24 +20,24 @@ export default function DeviceCards({ first = "", onClose }: { first?: string; o
   const card = cards?.find((each) => each.object_id === opened);
   if (card && replacing)
     return (
-      <Window title={t`Replace ${card.name}`} onClose={() => setReplacing(false)}>
+      <ModalDialog title={t`Replace ${card.name}`} onClose={() => setReplacing(false)}>
         <SwapWizard card={card} reload={reload} onClose={() => setReplacing(false)} onLeave={onClose} />
-      </Window>
+      </ModalDialog>
     );
   if (card)
     return (
-      <Window title={card.name} onClose={onClose}>
+      <ModalDialog title={card.name} onClose={onClose}>
         <Card card={card} reload={reload} onReplace={() => setReplacing(true)} />
         <div className="actions">
           <Button onPress={() => setOpened("")}>{t`All devices`}</Button>
-          <Button look="primary" onPress={onClose}>
+          <Button variant="primary" onPress={onClose}>
             {t`Close`}
           </Button>
         </div>
-      </Window>
+      </ModalDialog>
     );
   return (
-    <Window title={t`Device cards`} onClose={onClose}>
+    <ModalDialog title={t`Device cards`} onClose={onClose}>
       {cards === null && <Waiting>{t`Loading…`}</Waiting>}
       {(cards?.length === 0 || (cards && opened)) && (
         <p className="quiet">{t`A device has a card once it was online and reported its identity.`}</p>
@@ -64,10 +64,10 @@ export default function DeviceCards({ first = "", onClose }: { first?: string; o
         })}
       </ul>
       <div className="actions">
-        <Button look="primary" onPress={onClose}>
+        <Button variant="primary" onPress={onClose}>
           {t`Close`}
         </Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }

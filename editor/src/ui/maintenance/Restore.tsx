@@ -76,7 +76,7 @@ export function Restore({ card, backup }: Props) {
       )}
       <RefusedText>{refused}</RefusedText>
       {card.restores && changes.some((each) => each.backup !== undefined) && (
-        <Button look="primary" isDisabled={busy} onPress={() => void restore()}>
+        <Button variant="primary" isDisabled={busy} onPress={() => void restore()}>
           {t`Restore these values`}
         </Button>
       )}

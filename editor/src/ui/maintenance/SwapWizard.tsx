@@ -47,7 +47,7 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
       <>
         <p>{t`The confirmed device is connected.`}</p>
         <div className="actions">
-          <Button look="primary" onPress={onClose}>
+          <Button variant="primary" onPress={onClose}>
             {t`Close`}
           </Button>
         </div>
@@ -158,7 +158,7 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
             {other && object && inScene && measured && measured.length > 0 && (
               <Button onPress={calibrate}>{t`Open calibration`}</Button>
             )}
-            <Button look="primary" onPress={onClose}>
+            <Button variant="primary" onPress={onClose}>
               {t`Close`}
             </Button>
           </>
@@ -166,11 +166,11 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
           <>
             <Button onPress={step === 0 ? onClose : () => setStep(step - 1)}>{step === 0 ? t`Cancel` : t`Back`}</Button>
             {step < LAST ? (
-              <Button look="primary" onPress={() => setStep(step + 1)}>
+              <Button variant="primary" onPress={() => setStep(step + 1)}>
                 {t`Next`}
               </Button>
             ) : (
-              <Button look="primary" isDisabled={busy} onPress={() => void confirm()}>
+              <Button variant="primary" isDisabled={busy} onPress={() => void confirm()}>
                 {t`Confirm this device`}
               </Button>
             )}

@@ -27,7 +27,7 @@ export default function NodeList() {
       {problem && <p className="small alarm">{problem}</p>}
       {nodes.nodes.length === 0 && (
         <p className="quiet small">
-          {t`No other computer is connected.`} <Starting name="NAME" />
+          {t`No other computer is connected.`} <StartCommand name="NAME" />
         </p>
       )}
       <ul className="devices">
@@ -54,7 +54,7 @@ function Node({ node }: { node: NodeStatus }) {
       {state === "silent" && (
         <p className="small">
           {node.seen ? t`Last signal ${ago(node.seen)}.` : t`No signal since the server was started.`}{" "}
-          {t`Switch the computer on and check its network cable.`} <Starting name={name} />
+          {t`Switch the computer on and check its network cable.`} <StartCommand name={name} />
         </p>
       )}
       {state === "other_version" && (
@@ -83,7 +83,7 @@ function Node({ node }: { node: NodeStatus }) {
 }
 
 /** How to start a node on its computer: with the service of systemd, or by hand. */
-const Starting = ({ name }: { name: string }) => (
+const StartCommand = ({ name }: { name: string }) => (
   <>
     {t`Then start the node there:`} <code>systemctl restart arcor2-hw-node@{name}</code> {t`Without the service:`}{" "}
     <code>arcor2-hw node run {name}</code>

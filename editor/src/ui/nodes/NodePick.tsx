@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { objectsByNode } from "../../commands/nodes";
 import { useEditor } from "../../store/store";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 
 interface NodePickProps {
   /** Name of the node; empty for the computer of the server. */
@@ -21,7 +21,7 @@ export function NodePick({ chosen, isDisabled, onChange }: NodePickProps) {
   const silent = listed.find(({ name }) => name === chosen)?.state === "silent";
   return (
     <>
-      <Pick
+      <SelectField
         label={t`Runs on`}
         value={chosen}
         isDisabled={isDisabled}

@@ -4,7 +4,7 @@ import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { clock } from "../../formats";
 import { useEditor } from "../../store/store";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import "./messages.css";
@@ -14,7 +14,7 @@ const WORDS = { info: msg`note`, warn: msg`warning`, error: msg`error` };
 export default function Messages({ onClose }: { onClose: () => void }) {
   const messageLog = useEditor((state) => state.messageLog);
   return (
-    <Window title={t`Messages`} onClose={onClose}>
+    <ModalDialog title={t`Messages`} onClose={onClose}>
       {messageLog.length === 0 && <p className="quiet">{t`No messages yet.`}</p>}
       <ol className="messages" tabIndex={0} aria-label={t`Messages, newest first`}>
         {[...messageLog].reverse().map(({ id, level, text, time }) => (
@@ -31,10 +31,10 @@ export default function Messages({ onClose }: { onClose: () => void }) {
         ))}
       </ol>
       <div className="actions">
-        <Button look="primary" onPress={onClose}>
+        <Button variant="primary" onPress={onClose}>
           {t`Close`}
         </Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }

@@ -51,7 +51,7 @@ export function Notices({ docked = false }: { docked?: boolean }) {
             <span>{splitAddress(newest.text).text}</span>
             {more > 0 && <span className="tag">+{more}</span>}
           </button>
-          <Button look="plain" icon="close" aria-label={t`Dismiss`} onPress={() => dismiss(newest.id)} />
+          <Button variant="plain" icon="close" aria-label={t`Dismiss`} onPress={() => dismiss(newest.id)} />
         </div>
       )}
     </section>
@@ -92,7 +92,7 @@ function Task({ task }: { task: TaskStateData }) {
       </div>
       {over && (
         <Button
-          look="plain"
+          variant="plain"
           icon="close"
           aria-label={t`Dismiss`}
           onPress={() => store.setState((now) => ({ tasks: without(now.tasks, id) }))}

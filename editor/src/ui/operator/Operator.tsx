@@ -31,7 +31,7 @@ import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
 import PartsCard, { useInventories } from "../parts/PartsCard";
 import { People } from "../people/People";
-import type { Chosen } from "../production/Product";
+import type { ChosenProduct } from "../production/Product";
 import { endName, History } from "../run/History";
 import { ICONS } from "../run/Result";
 import { Held, phaseName, RunButtons } from "../run/RunBar";
@@ -82,7 +82,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const packages = [...(lists.packages ?? [])].sort((a, b) => b.package_meta.built.localeCompare(a.package_meta.built));
   const [chosen, setChosen] = useState("");
   /** The product to start, null if none was chosen, undefined until it is loaded. */
-  const [product, setProduct] = useState<Chosen | null | undefined>(serves("ListRecipes") ? undefined : null);
+  const [product, setProduct] = useState<ChosenProduct | null | undefined>(serves("ListRecipes") ? undefined : null);
   const [releasedOnly, setReleasedOnly] = useState(false);
   const [starting, setStarting] = useState(false);
   const [listing, setListing] = useState(false);
@@ -149,13 +149,13 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
     <div className="operator" data-tone={tone} data-alarm={alarms.some((each) => !each.acknowledged)}>
       <header className="bar">
         {!kiosk && (
-          <Button look="plain" icon="home" aria-label={t`Open the editor`} onPress={() => (location.hash = "")} />
+          <Button variant="plain" icon="home" aria-label={t`Open the editor`} onPress={() => (location.hash = "")} />
         )}
         <CellName />
         <h1 data-name={runs || undefined}>{runs ? program.packageName || t`Program` : t`Operator`}</h1>
         {serves("ListAlarms") && (
           <Button
-            look="plain"
+            variant="plain"
             icon="list"
             aria-label={t`All alarms`}
             aria-pressed={listing}
@@ -179,7 +179,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         ) : (
           <>
             <Button
-              look="primary"
+              variant="primary"
               icon="play"
               why={why}
               isDisabled={starting || product === undefined}
@@ -236,7 +236,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         {!program.held && <PartsCard whyNoStart={refused} />}
         {!program.held && <Alarms alarms={alarms} />}
         {note && (
-          <Button look="plain" icon="info" className="operator-note wraps" onPress={() => openOverlay("cell")}>
+          <Button variant="plain" icon="info" className="operator-note wraps" onPress={() => openOverlay("cell")}>
             {note}
           </Button>
         )}

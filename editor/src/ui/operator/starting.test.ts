@@ -1,12 +1,15 @@
 import { expect, test } from "vitest";
 import type { CellStatus } from "../../protocol/types";
 import { ROLES } from "../../protocol/types";
-import { now } from "../../store/store";
+import { getState } from "../../store/store";
 import { whyNoResume, whyNoStart } from "./starting";
 import "../../i18n/testing";
 
 const CELL: CellStatus = { state: "idle", mode: "produce", authority: "hub", jobs: [], held_by_plc: false };
-const STATE = { ...now(), connection: { ...now().connection, status: "ready" as const, role: ROLES.operator } };
+const STATE = {
+  ...getState(),
+  connection: { ...getState().connection, status: "ready" as const, role: ROLES.operator },
+};
 const FORCE = { id: "1", object_id: "obj", object: "io", point: "lamp", value: true, unit: "", user: "Eva", since: "" };
 
 test("Start says why the server would refuse it", () => {

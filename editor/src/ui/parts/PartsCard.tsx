@@ -9,7 +9,7 @@ import type { ConfirmedPart, Part, PartInventory, Place } from "../../protocol/t
 import { call, serves } from "../../session/connection";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import "../held/held.css";
@@ -46,7 +46,7 @@ declare module "../../store/runtime" {
 export function useInventories(): PartInventory[] | null {
   const ready = useEditor((state) => state.connection.status === "ready");
   const phase = useEditor((state) => state.program.state);
-  const { runtime } = now();
+  const { runtime } = getState();
   const [inventories, setInventories] = useState<PartInventory[] | null>(runtime.parts ?? null);
   if (inventories) runtime.parts = inventories;
   useEffect(() => {
@@ -171,7 +171,7 @@ function Inventory({
             {answersFor(part, inventory).map((place) => (
               <Button
                 key={place.id}
-                look={[part.place, part.moving_to].includes(place.id) ? "primary" : ""}
+                variant={[part.place, part.moving_to].includes(place.id) ? "primary" : ""}
                 why={why}
                 onPress={() => void confirm([{ number: part.number, place: place.id }])}
               >
@@ -193,7 +193,7 @@ function Inventory({
       {run?.confirmed && (
         <div className="held-choices">
           {continues && (
-            <Button look="primary" why={whyContinue} onPress={() => void runPackage(found.id, false, true)}>
+            <Button variant="primary" why={whyContinue} onPress={() => void runPackage(found.id, false, true)}>
               {at ? t`Continue at ${at}` : t`Continue after the last action`}
             </Button>
           )}
@@ -221,7 +221,7 @@ function Inventory({
       )}
       {run && !run.confirmed && parts.length === 0 && (
         <div className="held-choices">
-          <Button look="primary" why={why} onPress={() => void confirm([])}>
+          <Button variant="primary" why={why} onPress={() => void confirm([])}>
             {t`There are no parts in the cell`}
           </Button>
         </div>

@@ -2,10 +2,10 @@
 
 import { plural, t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";
-import { compared } from "../../formats";
+import { compareTexts } from "../../formats";
 import { serves } from "../../session/connection";
 import { absentLockHolders } from "../../store/absentUsers";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
@@ -23,14 +23,14 @@ export function People() {
   const called = (name: string) => {
     if (name === me) return t`${name} (you)`;
     const looked = users[name]?.presence?.selected[0];
-    const thing = looked && doc ? nameOf(now(), looked) : "";
+    const thing = looked && doc ? nameOf(getState(), looked) : "";
     return thing ? t`${name}, at ${thing}` : name;
   };
   const names = [
     me,
     ...Object.keys(users)
       .filter((name) => name !== me)
-      .sort(compared),
+      .sort(compareTexts),
   ];
   const shown = names.slice(0, 4);
   return (
@@ -40,7 +40,7 @@ export function People() {
       aria-label={
         names.length === 1
           ? t`Only you are connected`
-          : plural(names.length, { one: "# user is here", other: "# users are here" })
+          : plural(names.length, { one: "# user connected", other: "# users connected" })
       }
     >
       {shown.map((name) => (
@@ -84,7 +84,7 @@ function Gone() {
         .map((name) => (
           <Button
             key={name}
-            look="plain"
+            variant="plain"
             className="gone"
             aria-label={t`${name} left and still holds locks: take over`}
             onPress={() => setAsked(name)}

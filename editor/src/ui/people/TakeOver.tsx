@@ -6,7 +6,7 @@ import { ask } from "../../commands/requests";
 import { ago, clock } from "../../formats";
 import type { LockHolder } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
-import { notify, now, useEditor } from "../../store/store";
+import { getState, notify, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Confirm } from "../kit/dialogs";
 
@@ -26,7 +26,7 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
       shown = false;
     };
   }, [user]);
-  const not =
+  const why =
     cannot ||
     (present
       ? t`${user} is connected again.`
@@ -42,13 +42,13 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
   return (
     <Confirm
       title={t`Take over from ${user}?`}
-      yes={t`Take over`}
-      not={not}
-      onYes={() => void takeOver()}
+      confirmLabel={t`Take over`}
+      why={why}
+      onConfirm={() => void takeOver()}
       onClose={onClose}
     >
       {missing || present ? (
-        <p>{not}</p>
+        <p>{why}</p>
       ) : !holder ? (
         <p role="status">{t`Loading…`}</p>
       ) : (
@@ -71,7 +71,7 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
 }
 
 function called({ object_id, name }: LockHolder["locks"][number]): string {
-  return name || nameOf(now(), object_id) || t`an item that is not open`;
+  return name || nameOf(getState(), object_id) || t`an item that is not open`;
 }
 
 /** Return "12:31 (5 minutes ago)". */

@@ -5,7 +5,7 @@ import { type FormEvent, useState } from "react";
 import { refusal } from "../../commands/requests";
 import { call } from "../../session/connection";
 import { notify } from "../../store/store";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Field } from "../kit/Field";
 import { Button } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
@@ -24,7 +24,7 @@ export default function ChangePin({ onClose }: { onClose: () => void }) {
   };
   const secret = { type: "password", inputMode: "numeric", autoComplete: "off", maxLength: 12 } as const;
   return (
-    <Window title={t`Change PIN`} onClose={onClose}>
+    <ModalDialog title={t`Change PIN`} onClose={onClose}>
       <form className="ask-name" onSubmit={(event) => void submit(event)}>
         <Field label={t`Present PIN`} value={pin} onChange={setPin} autoFocus {...secret} />
         <Field label={t`New PIN, 4 to 12 digits`} value={wanted} onChange={setWanted} {...secret} />
@@ -39,11 +39,11 @@ export default function ChangePin({ onClose }: { onClose: () => void }) {
         <RefusedText>{refused}</RefusedText>
         <div className="actions">
           <Button onPress={onClose}>{t`Cancel`}</Button>
-          <Button look="primary" type="submit" isDisabled={busy || !pin || !wanted || again !== wanted}>
+          <Button variant="primary" type="submit" isDisabled={busy || !pin || !wanted || again !== wanted}>
             {t`Change`}
           </Button>
         </div>
       </form>
-    </Window>
+    </ModalDialog>
   );
 }

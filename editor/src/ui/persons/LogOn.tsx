@@ -139,7 +139,7 @@ function FirstAdministrator({ onDone }: { onDone: () => void }) {
       />
       {differs && <p className="error small">{t`The two PINs differ.`}</p>}
       <RefusedText>{refused}</RefusedText>
-      <Button look="primary" type="submit" isDisabled={busy || !name.trim() || pin.length < 4 || pin !== again}>
+      <Button variant="primary" type="submit" isDisabled={busy || !name.trim() || pin.length < 4 || pin !== again}>
         {t`Add administrator`}
       </Button>
     </form>

@@ -8,9 +8,9 @@ import { dateAndTime } from "../../formats";
 import type { Person } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { ROLE_NAMES, type RoleName } from "../../viewmodel/roles";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Field } from "../kit/Field";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
 import { RefusedText, useRefusal } from "../points/Refusal";
@@ -45,7 +45,7 @@ export default function Persons({ onClose }: { onClose: () => void }) {
       />
     );
   return (
-    <Window title={t`Persons`} onClose={onClose}>
+    <ModalDialog title={t`Persons`} onClose={onClose}>
       <p className="quiet small">{t`They log on at shared devices. Programmers manage persons.`}</p>
       {persons === null && !refused && <Waiting>{t`Loading…`}</Waiting>}
       {persons?.length === 0 && <p className="quiet">{t`No persons yet.`}</p>}
@@ -78,7 +78,7 @@ export default function Persons({ onClose }: { onClose: () => void }) {
               {t`Change`}
             </Button>
             <Button
-              look="plain"
+              variant="plain"
               icon="close"
               isDisabled={busy}
               aria-label={t`Remove ${each.name}`}
@@ -92,21 +92,21 @@ export default function Persons({ onClose }: { onClose: () => void }) {
         <Button icon="plus" isDisabled={persons === null} onPress={() => setEdited("new")}>
           {t`Add person`}
         </Button>
-        <Button look="primary" onPress={onClose}>
+        <Button variant="primary" onPress={onClose}>
           {t`Close`}
         </Button>
       </div>
       {removed && (
         <Confirm
           title={t`Remove ${removed.name}?`}
-          yes={t`Remove`}
-          onYes={() => void send(() => call("RemovePerson", { id: removed.id }))}
+          confirmLabel={t`Remove`}
+          onConfirm={() => void send(() => call("RemovePerson", { id: removed.id }))}
           onClose={() => setRemoved(null)}
         >
           {t`They are logged off at once. The audit trail keeps the name.`}
         </Confirm>
       )}
-    </Window>
+    </ModalDialog>
   );
 }
 
@@ -135,7 +135,7 @@ function PersonForm({ person, onClose, onSaved }: FormProps) {
     onSaved();
   };
   return (
-    <Window title={person ? t`Change ${person.name}` : t`Add person`} onClose={onClose}>
+    <ModalDialog title={person ? t`Change ${person.name}` : t`Add person`} onClose={onClose}>
       <form
         className="person-form"
         onSubmit={(event) => {
@@ -144,7 +144,7 @@ function PersonForm({ person, onClose, onSaved }: FormProps) {
         }}
       >
         <Field label={t`Name`} value={name} onChange={setName} maxLength={60} autoFocus autoComplete="off" />
-        <Pick
+        <SelectField
           label={t`Role`}
           value={role}
           choices={Object.entries(ROLE_NAMES).map(([key, words]) => [key, i18n._(words)] as const)}
@@ -171,11 +171,11 @@ function PersonForm({ person, onClose, onSaved }: FormProps) {
         <RefusedText>{refused}</RefusedText>
         <div className="actions">
           <Button onPress={onClose}>{t`Cancel`}</Button>
-          <Button look="primary" type="submit" isDisabled={busy || !name.trim()}>
+          <Button variant="primary" type="submit" isDisabled={busy || !name.trim()}>
             {t`Save`}
           </Button>
         </div>
       </form>
-    </Window>
+    </ModalDialog>
   );
 }

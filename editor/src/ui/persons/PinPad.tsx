@@ -58,7 +58,7 @@ export function PinPad({ busy, hasPin, onPin, onBack }: Props) {
           0
         </Button>
         <Button
-          look="primary"
+          variant="primary"
           icon="check"
           aria-label={t`Log on`}
           isDisabled={busy || pin.length < 4}

@@ -9,10 +9,10 @@ export const MAX_GAP = 50;
 const SHORTEST = 4;
 
 /**
- * The decision about a key. `typed`: delayed keys of a person, which precede it. `late`: number of keys of the card that
- * have already been given to the page, since the page was too busy to read the next one in time.
+ * The decision about a key. `typed`: delayed keys of a person, which precede it. `late`: number of keys of the card
+ * that have already been given to the page, since the page was too busy to read the next one in time.
  */
-export type Verdict = { hold: true } | { hold: false; typed: string } | { card: string; late: number };
+type Verdict = { hold: true } | { hold: false; typed: string } | { card: string; late: number };
 
 export class CardKeys {
   private held = "";

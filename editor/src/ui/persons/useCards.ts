@@ -1,13 +1,14 @@
+/** Cards that are read on this page, for the component that was shown last. */
 import { useEffect, useRef } from "react";
-import { now } from "../../store/store";
+import { getState } from "../../store/store";
 import { readCards } from "./cardReader";
 
 declare module "../../store/runtime" {
   interface Runtime {
     /** Callbacks for the cards that are read; only the last one is called. */
-    cardTakers?: ((card: string) => void)[];
+    cardListeners?: ((card: string) => void)[];
     /** Stops reading cards. */
-    endCards?: (() => void) | undefined;
+    stopReadingCards?: (() => void) | undefined;
   }
 }
 
@@ -17,17 +18,17 @@ export function useCards(onCard: (card: string) => void, active = true): void {
   latest.current = onCard;
   useEffect(() => {
     if (!active) return;
-    const { runtime } = now();
-    runtime.cardTakers ??= [];
-    const takers = runtime.cardTakers;
+    const { runtime } = getState();
+    runtime.cardListeners ??= [];
+    const listeners = runtime.cardListeners;
     const take = (card: string) => latest.current(card);
-    takers.push(take);
-    runtime.endCards ??= readCards((card) => takers.at(-1)?.(card));
+    listeners.push(take);
+    runtime.stopReadingCards ??= readCards((card) => listeners.at(-1)?.(card));
     return () => {
-      takers.splice(takers.indexOf(take), 1);
-      if (takers.length > 0) return;
-      runtime.endCards?.();
-      runtime.endCards = undefined;
+      listeners.splice(listeners.indexOf(take), 1);
+      if (listeners.length > 0) return;
+      runtime.stopReadingCards?.();
+      runtime.stopReadingCards = undefined;
     };
   }, [active]);
 }

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { copyPoint, mirrorPoint } from "../../commands/points";
 import type { Position } from "../../protocol/types";
-import { Amount } from "../kit/fields";
+import { NumberField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
 import { useWhyNot } from "./editing";
@@ -20,7 +20,7 @@ const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
       <summary>{t`Copies in a row`}</summary>
       <div className="amounts">
         {(["x", "y", "z"] as const).map((axis) => (
-          <Amount
+          <NumberField
             key={axis}
             label={t`Step ${axis.toUpperCase()}`}
             unit="mm"
@@ -29,7 +29,7 @@ const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
             onChange={(next) => setStep({ ...step, [axis]: next / 1000 })}
           />
         ))}
-        <Amount
+        <NumberField
           label={t`Copies`}
           unit=""
           digits={0}

@@ -5,7 +5,7 @@ import { removeJoints, renameJoints, setJoints, setJointsToRobot, solveJoints } 
 import { notReady } from "../../commands/robot";
 import { select, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
-import { Amount } from "../kit/fields";
+import { NumberField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { More } from "../kit/lazyControls";
 import { Limits, shownJoints } from "../robot/JointsTab";
@@ -45,7 +45,7 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
         why={why}
         onRename={(name) => renameJoints(id, name)}
       />
-      <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: stored.pointId })}>
+      <Button variant="plain" icon="point" onPress={() => select({ kind: "point", id: stored.pointId })}>
         {t`${robot} at ${point}`}
       </Button>
       {!stored.is_valid && <p className="tag warn">{t`The point has moved. These joints no longer reach it.`}</p>}
@@ -56,7 +56,7 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
               <span>{joint.name.replaceAll("_", " ")}</span>
               <Limits joint={joint} />
             </div>
-            <Amount
+            <NumberField
               label={joint.name.replaceAll("_", " ")}
               unit={joint.unit}
               value={joint.value * joint.scale}
@@ -84,12 +84,12 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
         {orientations.length > 1 ? (
           <More
             label={t`Recompute`}
-            look=""
+            variant=""
             icon="redo"
             choices={orientations.map((each) => ({
               id: each.id,
               label: t`for ${each.name}`,
-              not: why,
+              why: why,
               act: () => void ask(solveJoints(id, each.id)),
             }))}
           >

@@ -2,9 +2,9 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { chosenRobot, hideGhost, moveToTaught, notReady, showAt, showJoints } from "../../commands/robot";
+import { chosenRobot, hideGhost, moveToTaught, notReady, showGhostAt, showGhostJoints } from "../../commands/robot";
 import { theEngine } from "../../session/engine";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { worldOf } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
@@ -39,18 +39,18 @@ const MoveRobot: Section["Body"] = ({ selection: { kind, id } }) => {
   }, [id]);
   if (!chosen) return <p className="quiet">{t`The scene has no robot.`}</p>;
   const show = () => {
-    const { doc } = now();
+    const { doc } = getState();
     // Show the ghost only if it is visible.
     if (theEngine()?.item(robotId)?.visible === false) theEngine()?.focus(robotId);
     if (joints) {
-      const known = now().reach;
+      const known = getState().reach;
       const reach = Object.values(known)
         .flatMap((each) => each.items)
         .find((each) => each.id === id);
       const problem = reach?.reason ?? "";
-      showJoints(joints.robot_id, joints.joints, problem);
+      showGhostJoints(joints.robot_id, joints.joints, problem);
       setAnswer(problem);
-    } else if (orientation && doc) void showAt(chosen, worldOf(doc, id)).then(setAnswer);
+    } else if (orientation && doc) void showGhostAt(chosen, worldOf(doc, id)).then(setAnswer);
   };
   return (
     <>
@@ -59,7 +59,7 @@ const MoveRobot: Section["Body"] = ({ selection: { kind, id } }) => {
           {t`Preview ${name}`}
         </Button>
         <Button
-          look="primary"
+          variant="primary"
           why={why}
           isDisabled={busy}
           onPress={() =>

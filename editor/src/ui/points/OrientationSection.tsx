@@ -7,7 +7,7 @@ import { select, useEditor } from "../../store/store";
 import { fromRollPitchYaw } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
 import { rollPitchYaw } from "../../viewmodel/rotations";
-import { Amount } from "../kit/fields";
+import { NumberField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
 import { useWhyNot } from "./editing";
@@ -35,12 +35,12 @@ const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
         why={why}
         onRename={(name) => renameOrientation(id, name)}
       />
-      <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: one.pointId })}>
+      <Button variant="plain" icon="point" onPress={() => select({ kind: "point", id: one.pointId })}>
         {t`at ${point}`}
       </Button>
       <div className="amounts">
         {([t`Roll`, t`Pitch`, t`Yaw`] as const).map((name, n) => (
-          <Amount
+          <NumberField
             key={name}
             label={name}
             unit="°"

@@ -8,7 +8,7 @@ import { chosenRobot, featuresOf, notReady } from "../../commands/robot";
 import { storeViewState } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "../robot/HoldButton";
 import type { Section } from "../workplace/section";
@@ -45,7 +45,7 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
         why={why}
         onRename={(name) => renamePoint(id, name)}
       />
-      <Pick
+      <SelectField
         label={t`Parent`}
         value={point.parent ?? ""}
         choices={[["", t`World`], ...choices]}

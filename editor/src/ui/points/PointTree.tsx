@@ -7,7 +7,7 @@ import { possibleParents, setParent } from "../../commands/points";
 import { byName } from "../../formats";
 import { theEngine } from "../../session/engine";
 import type { OpenDocument } from "../../store/state";
-import { notify, now, select, setUi, useEditor } from "../../store/store";
+import { getState, notify, select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { ReachBadge } from "./Reach";
@@ -60,7 +60,7 @@ export function PointTree() {
     getDropOperation: (target) => (target.type === "item" && target.dropPosition === "on" ? "move" : "cancel"),
     onItemDrop: (event) => {
       void dropped(event.items).then((id) => {
-        if (id && now().doc?.points[id]) void hang(id, String(event.target.key));
+        if (id && getState().doc?.points[id]) void changeParent(id, String(event.target.key));
       });
     },
   });
@@ -104,9 +104,9 @@ async function dropped(items: DropItem[]): Promise<string> {
   return item && isTextDropItem(item) ? item.getText("text/plain") : "";
 }
 
-async function hang(id: string, target: string): Promise<void> {
+async function changeParent(id: string, target: string): Promise<void> {
   const parent = target === WORLD ? "" : target;
-  const state = now();
+  const state = getState();
   if ((state.doc?.points[id]?.parent ?? "") === parent) return;
   if (parent && !possibleParents(state, id).includes(parent)) {
     notify("info", t`${nameOf(state, parent)} is a child of ${nameOf(state, id)} and cannot be its parent.`);

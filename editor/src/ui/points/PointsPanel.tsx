@@ -11,11 +11,11 @@ import type { Position } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
 import { whyUnavailable } from "../../store/permissions";
 import { isClosed } from "../../store/selectors";
-import { notify, now, setUi, useEditor } from "../../store/store";
+import { getState, notify, setUi, useEditor } from "../../store/store";
 import { composed, ORIGIN, worldOf } from "../../viewmodel/frames";
 import { pointSize } from "../../viewmodel/items";
 import { nameOf } from "../../viewmodel/names";
-import { Amount, MoreOrLess, OneOf, OnOff } from "../kit/fields";
+import { NumberField, SliderField, SwitchField, ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { usePlaceTap } from "../robot/usePlaceTap";
 import { PointTree } from "./PointTree";
@@ -27,7 +27,7 @@ import "./points.css";
  * joints or action.
  */
 function parentOfSelection(): string {
-  const { doc, ui } = now();
+  const { doc, ui } = getState();
   const id = ui.selection?.id ?? "";
   if (!doc) return "";
   if (doc.points[id] || doc.objects[id]?.pose) return id;
@@ -45,7 +45,7 @@ export default function PointsPanel() {
   const noRobot = useEditor((state) => notReady(state, chosen, "AddApUsingRobot"));
   const [on, setOn] = useState<"parent" | "world">("parent");
   const [tapping, setTapping] = useState(false);
-  const [standing, setStanding] = useState(true);
+  const [withOrientation, setWithOrientation] = useState(true);
   const [typed, setTyped] = useState<Position>(ORIGIN.position);
   const size = useEditor(pointSize);
   const { refused, busy, ask } = useRefusal();
@@ -58,19 +58,19 @@ export default function PointsPanel() {
     });
 
   usePlaceTap(tapping, ({ position, normal }) => {
-    added(addPoint(position, parent, standing && normal ? against(normal) : undefined));
+    added(addPoint(position, parent, withOrientation && normal ? against(normal) : undefined));
   });
 
-  const atCross = () => {
+  const addAtCrosshair = () => {
     const place = aimedPlace();
-    if (place) added(addPoint(place.position, parent, standing ? place.orientation : undefined));
+    if (place) added(addPoint(place.position, parent, withOrientation ? place.orientation : undefined));
     else notify("info", t`Nothing at the crosshair. Aim at the table or an object.`);
   };
   return (
     <>
-      <Cross />
+      <Crosshair />
       {parentName && (
-        <OneOf
+        <ToggleGroup
           label={t`Parent`}
           value={on}
           onChange={setOn}
@@ -83,7 +83,7 @@ export default function PointsPanel() {
       <div className="add-point">
         <Button
           icon="robot"
-          look="primary"
+          variant="primary"
           why={why || noRobot}
           isDisabled={busy}
           onPress={() => chosen && added(addPointFromRobot(chosen))}
@@ -93,19 +93,19 @@ export default function PointsPanel() {
         <Button icon="point" why={why} isDisabled={busy} aria-pressed={tapping} onPress={() => setTapping(!tapping)}>
           {tapping ? t`Tap in the view…` : t`Where I tap`}
         </Button>
-        <Button icon="plus" why={why} isDisabled={busy} onPress={atCross}>
+        <Button icon="plus" why={why} isDisabled={busy} onPress={addAtCrosshair}>
           {t`At the crosshair`}
         </Button>
       </div>
-      <OnOff isSelected={standing} onChange={setStanding}>
+      <SwitchField isSelected={withOrientation} onChange={setWithOrientation}>
         {t`Add an orientation facing the surface`}
-      </OnOff>
+      </SwitchField>
       <details className="by-numbers">
         <summary>{t`By numbers`}</summary>
         <p className="quiet small">{parent ? t`Relative to ${parentName}.` : t`Relative to the world.`}</p>
         <div className="amounts">
           {(["x", "y", "z"] as const).map((axis) => (
-            <Amount
+            <NumberField
               key={axis}
               label={axis.toUpperCase()}
               unit="mm"
@@ -119,7 +119,7 @@ export default function PointsPanel() {
           why={why}
           isDisabled={busy}
           onPress={() => {
-            const { doc } = now();
+            const { doc } = getState();
             if (doc) added(addPoint(composed(worldOf(doc, parent), { ...ORIGIN, position: typed }).position, parent));
           }}
         >
@@ -128,7 +128,7 @@ export default function PointsPanel() {
       </details>
       <RefusedText>{refused}</RefusedText>
       <PointTree />
-      <MoreOrLess
+      <SliderField
         label={t`Point size`}
         value={size}
         least={0.5}
@@ -142,7 +142,7 @@ export default function PointsPanel() {
 }
 
 /** A crosshair in the middle of the view. */
-function Cross() {
+function Crosshair() {
   const view = theEngine() && document.querySelector(".view");
   return view && createPortal(<span className="aim-cross" aria-hidden="true" />, view);
 }

@@ -10,7 +10,7 @@ import {
 } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { theEngine } from "../../session/engine";
-import { now, select, useEditor } from "../../store/store";
+import { getState, select, useEditor } from "../../store/store";
 import type { Kind } from "../../store/ui";
 import { relativeTo, worldOf } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
@@ -32,7 +32,7 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
   const { refused, busy, ask } = useRefusal();
   const taught = Object.values(doc?.orientations ?? {}).filter((each) => each.pointId === id);
   const down = () => {
-    const open = now().doc;
+    const open = getState().doc;
     if (!open) return;
     const { orientation } = relativeTo(worldOf(open, id), { ...worldOf(open, id), orientation: DOWN });
     void ask(addOrientation(id, orientation, "down"));
@@ -44,7 +44,7 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
           <li key={each.id}>
             <Taught kind="orientation" id={each.id} name={each.name} />
             <Button
-              look="plain"
+              variant="plain"
               icon="close"
               aria-label={t`Remove orientation ${each.name}`}
               why={why}
@@ -66,13 +66,13 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
         <More
           label={t`Add orientation`}
           icon="plus"
-          look=""
+          variant=""
           choices={[
-            { id: "down", label: t`Tool straight down`, not: why, act: down },
+            { id: "down", label: t`Tool straight down`, why: why, act: down },
             {
               id: "parent",
               label: t`Same as the parent`,
-              not: why,
+              why: why,
               act: () => void ask(addOrientation(id, { x: 0, y: 0, z: 0, w: 1 })),
             },
           ]}
@@ -107,7 +107,7 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
             <Taught kind="joints" id={each.id} name={`${each.name} · ${each.robot}`} />
             {!each.is_valid && <span className="tag warn">{t`point has moved`}</span>}
             <Button
-              look="plain"
+              variant="plain"
               icon="close"
               aria-label={t`Remove joints ${each.name}`}
               why={why}
@@ -135,7 +135,7 @@ function Taught({ kind, id, name }: { kind: Kind; id: string; name: string }) {
   return (
     <Button
       className="taught-name"
-      look="plain"
+      variant="plain"
       onPress={() => select({ kind, id })}
       onHoverStart={() => theEngine()?.hover(id)}
       onHoverEnd={() => theEngine()?.hover("")}

@@ -7,7 +7,7 @@ import { heldBy, isClosed } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
 
-export function whyNotNow(state: State, id: string, request: keyof Requests): string {
+function whyNotNow(state: State, id: string, request: keyof Requests): string {
   if (isClosed(state)) return t`A program is running.`;
   const holder = heldBy(state, id);
   if (holder) return t`In use by ${holder}.`;

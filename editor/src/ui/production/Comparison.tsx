@@ -98,7 +98,7 @@ export function Comparison({ before, after, busy, refused, canChange, onChange, 
       <div className="actions">
         <Button onPress={onClose}>{t`Back`}</Button>
         {canChange && (
-          <Button look="primary" isDisabled={busy || found === null} onPress={onChange}>
+          <Button variant="primary" isDisabled={busy || found === null} onPress={onChange}>
             {t`Change over`}
           </Button>
         )}

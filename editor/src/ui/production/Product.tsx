@@ -14,7 +14,7 @@ import "./product.css";
 /** Time after which the product is loaded again, ms: another client may have changed over. */
 const PERIOD = 10_000;
 
-export interface Chosen extends RunValues {
+export interface ChosenProduct extends RunValues {
   recipe: Recipe;
   order: string;
 }
@@ -23,7 +23,7 @@ interface Props {
   selected: boolean;
   onSelect: () => void;
   /** Called with the product, null if none was chosen, and whether operators may start released packages only. */
-  onFound: (chosen: Chosen | null, releasedOnly: boolean) => void;
+  onFound: (chosen: ChosenProduct | null, releasedOnly: boolean) => void;
 }
 
 export default function Product({ selected, onSelect, onFound }: Props) {

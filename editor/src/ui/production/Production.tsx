@@ -2,8 +2,8 @@
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
-import { Window } from "../kit/dialogs";
-import { OneOf } from "../kit/fields";
+import { ModalDialog } from "../kit/dialogs";
+import { ToggleGroup } from "../kit/fields";
 import { Recipes } from "./Recipes";
 import { Units } from "./Units";
 import "./production.css";
@@ -13,8 +13,8 @@ type Page = "recipes" | "units";
 export default function Production({ onClose }: { onClose: () => void }) {
   const [page, setPage] = useState<Page>("recipes");
   return (
-    <Window title={t`Recipes and units`} onClose={onClose}>
-      <OneOf
+    <ModalDialog title={t`Recipes and units`} onClose={onClose}>
+      <ToggleGroup
         label={t`Page`}
         quiet
         value={page}
@@ -25,6 +25,6 @@ export default function Production({ onClose }: { onClose: () => void }) {
         onChange={setPage}
       />
       {page === "recipes" ? <Recipes onClose={onClose} /> : <Units onClose={onClose} />}
-    </Window>
+    </ModalDialog>
   );
 }

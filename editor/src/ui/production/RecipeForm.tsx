@@ -8,7 +8,7 @@ import type { ProjectParameter, Recipe, RecipeValue } from "../../protocol/types
 import { call } from "../../session/connection";
 import { useEditor } from "../../store/store";
 import { Field } from "../kit/Field";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 
@@ -92,7 +92,7 @@ export function RecipeForm({ recipe, onClose, onSaved }: Props) {
       <h3>{recipe ? shownRecipe(recipe) : t`Add recipe`}</h3>
       <div className="recipe-form">
         <Field label={t`Product`} value={product} onChange={setProduct} maxLength={100} autoFocus />
-        <Pick
+        <SelectField
           label={t`Package`}
           value={packageId}
           choices={packages.map((each) => [each.id, each.package_meta.name] as const)}
@@ -146,7 +146,7 @@ export function RecipeForm({ recipe, onClose, onSaved }: Props) {
       <RefusedText>{refused}</RefusedText>
       <div className="actions">
         <Button onPress={onClose}>{t`Cancel`}</Button>
-        <Button look="primary" why={why} isDisabled={busy} onPress={() => void ask(refusal(save))}>
+        <Button variant="primary" why={why} isDisabled={busy} onPress={() => void ask(refusal(save))}>
           {t`Save`}
         </Button>
       </div>

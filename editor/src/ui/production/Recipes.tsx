@@ -108,7 +108,7 @@ export function Recipes({ onClose }: { onClose: () => void }) {
                     onPress={() => setSigning({ recipe: each, state: "tested" })}
                   >{t`Sign as tested`}</Button>
                   <Button
-                    look="plain"
+                    variant="plain"
                     icon="close"
                     why={noEditing}
                     aria-label={t`Delete ${shownRecipe(each)}`}
@@ -129,7 +129,7 @@ export function Recipes({ onClose }: { onClose: () => void }) {
               )}
               {(each.state === "tested" || each.state === "released") && (
                 <Button
-                  look="plain"
+                  variant="plain"
                   why={noEditing}
                   onPress={() => setSigning({ recipe: each, state: "retired" })}
                 >{t`Retire`}</Button>
@@ -143,15 +143,15 @@ export function Recipes({ onClose }: { onClose: () => void }) {
         <Button icon="plus" why={noEditing} onPress={() => setOpened({ kind: "edit", recipe: null })}>
           {t`Add recipe`}
         </Button>
-        <Button look="primary" onPress={onClose}>
+        <Button variant="primary" onPress={onClose}>
           {t`Close`}
         </Button>
       </div>
       {opened?.kind === "back" && (
         <Confirm
           title={t`Roll back to ${shownRecipe(opened.recipe)}?`}
-          yes={t`Roll back`}
-          onYes={() => void send(() => call("ChangeOver", { id: opened.recipe.id }))}
+          confirmLabel={t`Roll back`}
+          onConfirm={() => void send(() => call("ChangeOver", { id: opened.recipe.id }))}
           onClose={() => setOpened(null)}
         >
           {t`The next run produces it. Nothing moves now.`}
@@ -160,8 +160,8 @@ export function Recipes({ onClose }: { onClose: () => void }) {
       {opened?.kind === "delete" && (
         <Confirm
           title={t`Delete ${shownRecipe(opened.recipe)}?`}
-          yes={t`Delete`}
-          onYes={() => void send(() => call("DeleteRecipe", { id: opened.recipe.id }))}
+          confirmLabel={t`Delete`}
+          onConfirm={() => void send(() => call("DeleteRecipe", { id: opened.recipe.id }))}
           onClose={() => setOpened(null)}
         >
           {t`Only drafts can be deleted.`}

@@ -8,7 +8,7 @@ import { refusal } from "../../commands/requests";
 import type { ListPersonsData, Recipe } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { Field } from "../kit/Field";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 
@@ -59,7 +59,7 @@ export function SignForm({ recipe, state, onClose, onSigned }: Props) {
       )}
       {able && able.length > 0 && (
         <>
-          <Pick
+          <SelectField
             label={t`Person`}
             value={person}
             choices={able.map((each) => [each.id, each.name] as const)}
@@ -80,7 +80,7 @@ export function SignForm({ recipe, state, onClose, onSigned }: Props) {
       <RefusedText>{refused}</RefusedText>
       <div className="actions">
         <Button onPress={onClose}>{t`Cancel`}</Button>
-        <Button look="primary" isDisabled={busy || !person || pin.length < 4} onPress={() => void sign()}>
+        <Button variant="primary" isDisabled={busy || !person || pin.length < 4} onPress={() => void sign()}>
           {t`Sign`}
         </Button>
       </div>

@@ -9,7 +9,7 @@ import { refusal } from "../../commands/requests";
 import { dateAndTime, decimal, hours } from "../../formats";
 import type { Production, Unit, UnitRecord } from "../../protocol/types";
 import { call } from "../../session/connection";
-import { OneOf } from "../kit/fields";
+import { ToggleGroup } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { nameOf, UnitDetails } from "./UnitDetails";
@@ -56,7 +56,7 @@ export function Units({ onClose }: { onClose: () => void }) {
           {units?.map((unit) => (
             <li key={unit.number}>
               <Button
-                look="plain"
+                variant="plain"
                 isDisabled={busy}
                 onPress={() => void ask(refusal(async () => setOpened(await call("GetUnit", { number: unit.number }))))}
               >
@@ -80,7 +80,7 @@ export function Units({ onClose }: { onClose: () => void }) {
           isDisabled={busy}
           onPress={() => void ask(refusal(() => exportUnits(serial.trim())))}
         >{t`Export`}</Button>
-        <Button look="primary" onPress={onClose}>
+        <Button variant="primary" onPress={onClose}>
           {t`Close`}
         </Button>
       </div>
@@ -118,7 +118,7 @@ function Numbers() {
     : [];
   return (
     <section className="numbers" aria-label={t`Numbers of the period`}>
-      <OneOf
+      <ToggleGroup
         label={t`Period`}
         quiet
         value={period}

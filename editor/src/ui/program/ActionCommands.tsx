@@ -21,17 +21,17 @@ import "./program.css";
 const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
   const state = useEditor((each) => each);
   const [renaming, setRenaming] = useState(false);
-  const { doc, types, live, tried, breakpoints } = state;
+  const { doc, types, live, singleResults, breakpoints } = state;
   const action = doc?.actions[id];
   if (!doc || !action) return null;
   const meta = metaOf(types, doc, action);
   const why = notEditable(state, "RemoveAction");
   const owner = doc.actions[parallelOf(doc).get(id) ?? ""];
-  const fixed =
+  const cannotRemove =
     why || (owner ? t`${action.name} is a branch of ${owner.name}. Select ${owner.name} to change it.` : "");
-  const single = why || (isParallel(action) ? t`Parallel work cannot be duplicated.` : "");
+  const cannotDuplicate = why || (isParallel(action) ? t`Parallel work cannot be duplicated.` : "");
   const running = live.executing === id;
-  const notNow =
+  const cannotTry =
     notEditable(state, "ExecuteAction") ||
     (calledBy(doc, action) || isParallel(action) ? t`Run the project to run a function.` : "") ||
     (live.state !== "started"
@@ -47,8 +47,8 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
     setUi({ tool: "run" });
     void startDryRun({ from_action: id });
   };
-  const inside = doc.path.length > 0 ? t`A dry run starts in the program, not in a function.` : "";
-  const stays = doc.project?.has_logic ? notRunnable(state) : t`The project has no program.`;
+  const cannotDryRun = doc.path.length > 0 ? t`A dry run starts in the program, not in a function.` : "";
+  const cannotRun = doc.project?.has_logic ? notRunnable(state) : t`The project has no program.`;
   return (
     <>
       <div className="row">
@@ -57,15 +57,15 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
             {meta?.meta.cancellable ? t`Cancel` : t`Stop all`}
           </Button>
         ) : (
-          <Button icon="play" why={notNow} onPress={() => void execute(id)}>
+          <Button icon="play" why={cannotTry} onPress={() => void execute(id)}>
             {t`Try`}
           </Button>
         )}
-        <Button icon="play" why={stays} onPress={() => void runTo(id)}>
+        <Button icon="play" why={cannotRun} onPress={() => void runTo(id)}>
           {t`Run to here`}
         </Button>
         {doc.project?.has_logic && (
-          <Button icon="eye" why={notPredictable(state) || inside} onPress={predict}>
+          <Button icon="eye" why={notPredictable(state) || cannotDryRun} onPress={predict}>
             {t`Dry run from here`}
           </Button>
         )}
@@ -83,7 +83,7 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
           <span className="spinner" aria-hidden="true" /> {t`Running…`}
         </p>
       )}
-      {tried
+      {singleResults
         .filter((each) => each.action_id === id)
         .slice(-3)
         .reverse()
@@ -101,18 +101,18 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
         <Rename id={id} name={action.name} onClose={() => setRenaming(false)} />
       ) : (
         <div className="row">
-          <Button look="plain" why={why} onPress={() => setRenaming(true)}>
+          <Button variant="plain" why={why} onPress={() => setRenaming(true)}>
             {t`Rename`}
           </Button>
           {doc.project?.has_logic && !owner && (
-            <Button look="plain" why={notEditable(state, "MakeFunction")} onPress={pick}>
+            <Button variant="plain" why={notEditable(state, "MakeFunction")} onPress={pick}>
               {t`Make a function`}
             </Button>
           )}
-          <Button look="plain" why={single} onPress={() => void duplicateAction(action)}>
+          <Button variant="plain" why={cannotDuplicate} onPress={() => void duplicateAction(action)}>
             {t`Duplicate`}
           </Button>
-          <Button look="plain" why={fixed} onPress={() => void removeAction(id)}>
+          <Button variant="plain" why={cannotRemove} onPress={() => void removeAction(id)}>
             {t`Remove`}
           </Button>
         </div>
@@ -141,7 +141,7 @@ function Rename({ id, name, onClose }: { id: string; name: string; onClose: () =
         </p>
       )}
       <div className="row">
-        <Button look="primary" type="submit" isDisabled={text.trim() === ""}>
+        <Button variant="primary" type="submit" isDisabled={text.trim() === ""}>
           {t`Rename`}
         </Button>
         <Button onPress={onClose}>{t`Cancel`}</Button>

@@ -12,11 +12,11 @@ import { decoded } from "../../program/decoded";
 import { linkToError, usableErrors } from "../../program/errorExits";
 import { linkTo, metaOf, usable } from "../../program/logic";
 import { freeName, words } from "../../program/naming";
-import { extraOf, initial, SIMPLE, type Source, sourceOf, typeName } from "../../program/values";
+import { extraOf, initialValue, SIMPLE, type Source, sourceOf, typeName } from "../../program/values";
 import type { ActionParameter, ParameterMeta } from "../../protocol/types";
 import { scopeOf } from "../../store/scope";
 import type { State } from "../../store/state";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { ReachOfAction } from "../points/Reach";
 import type { Section } from "../workplace/section";
@@ -43,7 +43,7 @@ const ActionParameters: Section["Body"] = ({ selection: { id } }) => {
     <>
       <ReachOfAction id={id} />
       {meta.parameters.map((wanted) => (
-        <One
+        <ParameterField
           key={`${id}/${wanted.name}`}
           actionId={id}
           wanted={wanted}
@@ -55,7 +55,7 @@ const ActionParameters: Section["Body"] = ({ selection: { id } }) => {
 };
 export default ActionParameters;
 
-function One({
+function ParameterField({
   actionId,
   wanted,
   parameter,
@@ -79,7 +79,7 @@ function One({
     (each) => each.type === type && each.name !== "scene_id" && each.name !== "project_id",
   );
   const open = doc.functions[scopeOf(doc)];
-  const present = chosen === "value" ? (parameter?.value ?? initial(wanted)) : initial(wanted);
+  const present = chosen === "value" ? (parameter?.value ?? initialValue(wanted)) : initialValue(wanted);
   const sources: Source[] =
     type === "image"
       ? ["link"]
@@ -191,7 +191,7 @@ async function sharedFrom(
 ): Promise<{ id: string } | { problem: string }> {
   const free = freeName(
     name,
-    Object.values(now().doc?.parameters ?? {}).map((each) => each.name),
+    Object.values(getState().doc?.parameters ?? {}).map((each) => each.name),
   );
   const problem = await addParameter(free, type, value ?? '""');
   if (problem) return { problem };

@@ -27,10 +27,10 @@ import { SERVICES } from "../../program/services";
 import type { ObjectAction } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
 import type { OpenDocument, State } from "../../store/state";
-import { notify, now, select, setUi, useEditor } from "../../store/store";
+import { getState, notify, select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { NewFunction, OpenButton } from "../functions/FunctionOffers";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { CATEGORY_ICONS } from "./categories";
@@ -70,7 +70,7 @@ export function AddAction() {
   const slots = doc?.project?.has_logic ? slotsOf(doc, types) : [];
   const proposed = doc?.project?.has_logic ? slotFor(doc, types, selectedId) : null;
   const chosen = (slot && slots.find((each) => slotKey(each) === slotKey(slot))) ?? proposed;
-  const offers = useMemo(() => offersOf(now(), onPoint), [doc, types, onPoint, online]);
+  const offers = useMemo(() => offersOf(getState(), onPoint), [doc, types, onPoint, online]);
   const wanted = search.trim().toLowerCase();
   const found = offers.filter((each) =>
     `${each.object} ${titleOf(each)} ${each.meta.description ?? ""} ${words(each.category)}`
@@ -132,10 +132,10 @@ export function AddAction() {
         </p>
       </div>
       {chosen && (
-        <Pick
+        <SelectField
           label={t`Follows`}
           value={slotKey(chosen)}
-          choices={slots.map((each) => [slotKey(each), slotWords(now(), each)])}
+          choices={slots.map((each) => [slotKey(each), slotWords(getState(), each)])}
           onChange={(key) => setSlot(slots.find((each) => slotKey(each) === key) ?? null)}
         />
       )}
@@ -152,7 +152,7 @@ export function AddAction() {
           </Button>
         </p>
       )}
-      {!onPoint && <Cross />}
+      {!onPoint && <Crosshair />}
       <SearchField className="field" value={search} onChange={setSearch}>
         <Label className="hidden-but-read">{t`Search actions`}</Label>
         <Input placeholder={t`Search ${offers.length} actions`} />
@@ -182,7 +182,7 @@ export function AddAction() {
 }
 
 /** Marks the middle of the view. */
-function Cross() {
+function Crosshair() {
   const view = document.querySelector(".view");
   return view && createPortal(<span className="crosshair" aria-hidden="true" />, view);
 }
@@ -199,7 +199,7 @@ function slotWords(state: State, { after, condition, exit }: Slot): string {
 
 function placeFor(pointId: string): Where | null {
   if (!pointId) return aimedPlace();
-  const { selection } = now().ui;
+  const { selection } = getState().ui;
   return selection?.kind === "orientation" ? { pointId, orientationId: selection.id } : { pointId };
 }
 

@@ -90,7 +90,7 @@ export function Comparisons({ doc, types, when, operands, from, none, why, onSet
       )}
       {comparisons.length > 0 && unused && (
         <Button
-          look="plain"
+          variant="plain"
           icon="plus"
           why={why}
           onPress={() => void put((rows) => [...rows, newComparison(unused, rows)])}
@@ -147,7 +147,7 @@ function Row({
           <label htmlFor={id}>{heading}</label>
           {onRemove && (
             <Button
-              look="plain"
+              variant="plain"
               icon="close"
               aria-label={t`Remove comparison ${number + 1}`}
               why={why}

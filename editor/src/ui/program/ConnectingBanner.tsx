@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { cancelConnecting } from "../../commands/program";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 
@@ -22,10 +22,10 @@ export default function ConnectingBanner() {
     <div className="banner" role="status">
       <span>
         {connecting.error
-          ? t`Tap the step that follows if ${nameOf(now(), connecting.from)} fails.`
-          : t`Tap the step that follows ${nameOf(now(), connecting.from)}.`}
+          ? t`Tap the step that follows if ${nameOf(getState(), connecting.from)} fails.`
+          : t`Tap the step that follows ${nameOf(getState(), connecting.from)}.`}
       </span>
-      <Button look="plain" className="wraps" onPress={cancelConnecting}>
+      <Button variant="plain" className="wraps" onPress={cancelConnecting}>
         {t`Cancel`}
       </Button>
     </div>

@@ -13,7 +13,7 @@ import { isErrorExit, placeOf } from "../../program/steps";
 import { takenExit } from "../../program/taken";
 import { derivesFrom } from "../../store/selectors";
 import type { State } from "../../store/state";
-import { notify, now, select, useEditor } from "../../store/store";
+import { getState, notify, select, useEditor } from "../../store/store";
 import { nameOf, selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
@@ -90,12 +90,12 @@ const ErrorExit: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       <div className="row">
-        <Button look="plain" onPress={() => select(selectionOf(now(), action.id))}>
+        <Button variant="plain" onPress={() => select(selectionOf(getState(), action.id))}>
           {action.name}
         </Button>
         <span className="branch error">{t`on error`}</span>
         <span aria-hidden="true">→</span>
-        <Button look="plain" onPress={() => select(selectionOf(now(), to))}>
+        <Button variant="plain" onPress={() => select(selectionOf(getState(), to))}>
           {nameOf(state, to)}
         </Button>
       </div>
@@ -127,7 +127,7 @@ const ErrorExit: Section["Body"] = ({ selection: { id } }) => {
             <p className="small">
               {t`Used by`}{" "}
               {users.map((each) => (
-                <Button key={each} look="plain" onPress={() => select({ kind: "action", id: each })}>
+                <Button key={each} variant="plain" onPress={() => select({ kind: "action", id: each })}>
                   {doc.actions[each]?.name}
                 </Button>
               ))}
@@ -148,7 +148,7 @@ const ErrorExit: Section["Body"] = ({ selection: { id } }) => {
         <Button why={why} onPress={() => startConnecting(action.id, undefined, id)}>
           {t`Change target`}
         </Button>
-        <Button look="plain" why={why} onPress={() => void removeStep(id)}>
+        <Button variant="plain" why={why} onPress={() => void removeStep(id)}>
           {t`Remove`}
         </Button>
       </div>

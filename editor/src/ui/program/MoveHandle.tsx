@@ -64,7 +64,7 @@ export function MoveHandle({ id, name, run, drag, onDrag }: MoveHandleProps) {
       {open && (
         <>
           <Button
-            look="plain"
+            variant="plain"
             className="move-here"
             aria-label={t`Move ${name} up`}
             isDisabled={from === 0}
@@ -73,7 +73,7 @@ export function MoveHandle({ id, name, run, drag, onDrag }: MoveHandleProps) {
             <Drawing path={UP} />
           </Button>
           <Button
-            look="plain"
+            variant="plain"
             className="move-here"
             aria-label={t`Move ${name} down`}
             isDisabled={from === run.length - 1}

@@ -54,14 +54,14 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
       <ul className="next-steps">
         {all.map((step) => (
           <li key={step.id}>
-            <Button look="plain" className="next-step" onPress={() => select({ kind: "logic", id: step.id })}>
+            <Button variant="plain" className="next-step" onPress={() => select({ kind: "logic", id: step.id })}>
               {conditionWords(doc, types, step) && (
                 <span className={`branch ${branchKind(step)}`}>{conditionWords(doc, types, step)}</span>
               )}
               <span aria-hidden="true">→</span> {nameOf(state, placeOf(step.end))}
             </Button>
             <Button
-              look="plain"
+              variant="plain"
               icon="close"
               aria-label={t`Remove the connection to ${nameOf(state, placeOf(step.end))}`}
               why={why}
@@ -103,7 +103,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
       </div>
       {run && (
         <Button
-          look="plain"
+          variant="plain"
           icon="list"
           onPress={() => {
             fold(run);
@@ -135,7 +135,7 @@ function Targets({ from }: { from: string }) {
       <ul className="next-steps targets" aria-label={t`Possible next steps`}>
         {targets.map((id) => (
           <li key={id}>
-            <Button look="plain" className="next-step" onPress={() => void finishConnecting(id)}>
+            <Button variant="plain" className="next-step" onPress={() => void finishConnecting(id)}>
               <Icon name={id === END ? "check" : "action"} size={16} /> {nameOf(state, id)}
             </Button>
           </li>

@@ -9,13 +9,13 @@ import { byName } from "../../formats";
 import { words } from "../../program/naming";
 import { usersOf } from "../../program/problems";
 import { lastRun } from "../../program/results";
-import { extraOf, OWN_PARAMETERS, read, SIMPLE, type Simple, textOf, typeName } from "../../program/values";
+import { extraOf, OWN_PARAMETERS, parseValue, SIMPLE, type Simple, textOf, typeName } from "../../program/values";
 import type { ParameterMeta } from "../../protocol/types";
 import { isRunning } from "../../store/selectors";
 import { select, useEditor } from "../../store/store";
 import { nameOf, selectionOf } from "../../viewmodel/names";
 import { Field } from "../kit/Field";
-import { OnOff } from "../kit/fields";
+import { SwitchField } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { ValueField } from "./ValueField";
 
@@ -28,7 +28,7 @@ export function Parameters() {
         .filter((each) => !OWN_PARAMETERS.has(each.name))
         .sort(byName)
         .map((each) => (
-          <One key={each.id} id={each.id} />
+          <Variable key={each.id} id={each.id} />
         ))}
       <NewParameter />
       <Overrides />
@@ -36,7 +36,7 @@ export function Parameters() {
   );
 }
 
-function One({ id }: { id: string }) {
+function Variable({ id }: { id: string }) {
   const state = useEditor((each) => each);
   const { doc, types } = state;
   const parameter = doc?.parameters[id];
@@ -60,7 +60,7 @@ function One({ id }: { id: string }) {
         onSet={(value) => updateParameter(id, { value })}
       >
         <Button
-          look="plain"
+          variant="plain"
           icon="close"
           aria-label={t`Remove ${parameter.name}`}
           why={cannotRemove}
@@ -116,7 +116,7 @@ function NewParameter() {
   }
   const submit = async (event: FormEvent) => {
     event.preventDefault();
-    const value = read(type, text);
+    const value = parseValue(type, text);
     if ("problem" in value) return setProblem(value.problem);
     const refused = await addParameter(name.trim(), type, value.json, variable);
     setProblem(refused);
@@ -148,7 +148,7 @@ function NewParameter() {
         onChange={setText}
         autoComplete="off"
       />
-      <OnOff isSelected={variable} onChange={setVariable}>{t`Set by actions`}</OnOff>
+      <SwitchField isSelected={variable} onChange={setVariable}>{t`Set by actions`}</SwitchField>
       {problem && (
         <p className="error" role="alert">
           {problem}
@@ -156,7 +156,7 @@ function NewParameter() {
       )}
       <div className="actions">
         <Button onPress={() => setOpen(false)}>{t`Cancel`}</Button>
-        <Button look="primary" type="submit" isDisabled={name.trim() === ""}>
+        <Button variant="primary" type="submit" isDisabled={name.trim() === ""}>
           {t`Add`}
         </Button>
       </div>
@@ -218,7 +218,7 @@ function Override({ objectId, setting }: { objectId: string; setting: ParameterM
     >
       {replaced !== undefined && (
         <Button
-          look="plain"
+          variant="plain"
           icon="undo"
           aria-label={t`Reset ${words(name)} to the scene`}
           why={why}

@@ -5,7 +5,7 @@ import { Button as AriaButton } from "react-aria-components";
 import type { Problem } from "../../program/problems";
 import { theEngine } from "../../session/engine";
 import { scopeOf } from "../../store/scope";
-import { now, select, setUi, show, useEditor } from "../../store/store";
+import { getState, select, setUi, showFunction, useEditor } from "../../store/store";
 import { selectionOf, withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 
@@ -31,8 +31,8 @@ export function Problems({ problems }: { problems: Problem[] }) {
           <AriaButton
             className={`fault ${each.level}`}
             onPress={() => {
-              if (each.scope !== scopeOf(now().doc ?? { path: [] })) show(each.scope ? [each.scope] : []);
-              select(selectionOf(now(), each.id));
+              if (each.scope !== scopeOf(getState().doc ?? { path: [] })) showFunction(each.scope ? [each.scope] : []);
+              select(selectionOf(getState(), each.id));
               setUi({ tool: "" });
               theEngine()?.focus(each.id);
             }}
@@ -40,7 +40,7 @@ export function Problems({ problems }: { problems: Problem[] }) {
             <Icon name={each.level === "error" ? "warn" : "info"} />
             <span>
               <span className="hidden-but-read">{each.level === "error" ? t`Error:` : t`Warning:`} </span>
-              {withNames(now(), each.text)}
+              {withNames(getState(), each.text)}
             </span>
           </AriaButton>
         </li>

@@ -21,11 +21,11 @@ const Puck: Section["Body"] = ({ selection: { id, kind } }) => {
     <>
       <p className="quiet small">{t`Drag the puck in the view. The program does not change.`}</p>
       <div className="row">
-        <Button look="plain" why={why} onPress={move}>
+        <Button variant="plain" why={why} onPress={move}>
           {t`Move to the view center`}
         </Button>
         {placed && (
-          <Button look="plain" why={why} onPress={() => void placePuck(id, null)}>
+          <Button variant="plain" why={why} onPress={() => void placePuck(id, null)}>
             {kind === "action" ? t`Reset position` : t`Reset position`}
           </Button>
         )}

@@ -9,7 +9,7 @@ import { calledBy } from "../../program/operands";
 import { runnerOf } from "../../program/parallel";
 import { valuesOf } from "../../program/step";
 import { useEditor } from "../../store/store";
-import { taken } from "../aim/OffScreen";
+import { controlAreas } from "../aim/OffScreen";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import ActionParameters from "./ActionParameters";
@@ -58,7 +58,7 @@ function Values({ engine, id, name, puck, values }: ValuesProps) {
       if (!element || !view) return;
       const at = bearingOf(engine, puck);
       const { offsetWidth: width, offsetHeight: height } = element;
-      const others = taken(view, element);
+      const others = controlAreas(view, element);
       // Below the puck, if possible; otherwise next to it, or above its name.
       const places = at?.inView
         ? [
@@ -103,14 +103,14 @@ function Values({ engine, id, name, puck, values }: ValuesProps) {
         <>
           <div className="puck-head">
             <strong>{name}</strong>
-            <Button look="plain" icon="close" aria-label={t`Close the values`} onPress={() => setOpen(false)} />
+            <Button variant="plain" icon="close" aria-label={t`Close the values`} onPress={() => setOpen(false)} />
           </div>
           <div className="puck-fields">
             <ActionParameters selection={{ kind: "action", id }} />
           </div>
         </>
       ) : (
-        <Button look="plain" onPress={show}>
+        <Button variant="plain" onPress={show}>
           <Icon name="function" size={16} />
           <span className="puck-words">{values || t`Parameters`}</span>
         </Button>

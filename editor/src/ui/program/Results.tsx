@@ -24,7 +24,7 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
   const called = calledBy(doc, action);
   const method = called?.name ?? action.type.split("/")[1] ?? action.name;
   const why = notEditable(state);
-  if (returns.length === 0) return <p className="quiet small">{t`Nothing.`}</p>;
+  if (returns.length === 0) return <p className="quiet small">{t`No results`}</p>;
   if (outputs.length === 0) {
     return (
       <>
@@ -89,7 +89,7 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
         <p className="small">
           {t`Used by`}{" "}
           {users.map((each) => (
-            <Button key={each} look="plain" onPress={() => select({ kind: "action", id: each })}>
+            <Button key={each} variant="plain" onPress={() => select({ kind: "action", id: each })}>
               {doc.actions[each]?.name}
             </Button>
           ))}

@@ -2,9 +2,9 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { chosenRobot, hideGhost, showAt, showJoints } from "../../commands/robot";
+import { chosenRobot, hideGhost, showGhostAt, showGhostJoints } from "../../commands/robot";
 import { theEngine } from "../../session/engine";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { worldOf } from "../../viewmodel/frames";
 import { Button } from "../kit/kit";
 
@@ -26,11 +26,11 @@ export function ShowValue({ robotId, label, value }: ShowValueProps) {
   const [shown, setShown] = useState(false);
   const [problem, setProblem] = useState("");
   const show = () => {
-    const { doc } = now();
+    const { doc } = getState();
     if (!doc) return;
     setProblem("");
-    if (joints) showJoints(robotId, joints.joints);
-    else if (mine) void showAt(mine, worldOf(doc, value)).then(setProblem);
+    if (joints) showGhostJoints(robotId, joints.joints);
+    else if (mine) void showGhostAt(mine, worldOf(doc, value)).then(setProblem);
     if (theEngine()?.item(robotId)?.visible === false) theEngine()?.focus(robotId);
   };
   // While it is shown, the ghost follows the value.
@@ -44,7 +44,7 @@ export function ShowValue({ robotId, label, value }: ShowValueProps) {
   return (
     <>
       <Button
-        look="plain"
+        variant="plain"
         icon="eye"
         aria-pressed={shown}
         aria-label={t`Show ${label} in the 3D view`}

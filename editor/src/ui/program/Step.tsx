@@ -7,7 +7,7 @@ import { operandsOf } from "../../program/comparisons";
 import { branchProblems } from "../../program/completeness";
 import { nextSteps, placeOf, START, whenOf } from "../../program/logic";
 import type { LogicWhen } from "../../protocol/types";
-import { now, select, useEditor } from "../../store/store";
+import { getState, select, useEditor } from "../../store/store";
 import { nameOf, selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
@@ -34,11 +34,11 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       <div className="row">
-        <Button look="plain" onPress={() => select(selectionOf(now(), from))}>
+        <Button variant="plain" onPress={() => select(selectionOf(getState(), from))}>
           {nameOf(state, from)}
         </Button>
         <span aria-hidden="true">→</span>
-        <Button look="plain" onPress={() => select(selectionOf(now(), to))}>
+        <Button variant="plain" onPress={() => select(selectionOf(getState(), to))}>
           {nameOf(state, to)}
         </Button>
       </div>
@@ -79,7 +79,7 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
         <Button why={why} onPress={() => startConnecting(from, undefined, id)}>
           {t`Change target`}
         </Button>
-        <Button look="plain" why={why} onPress={() => void removeStep(id)}>
+        <Button variant="plain" why={why} onPress={() => void removeStep(id)}>
           {t`Remove`}
         </Button>
       </div>

@@ -24,7 +24,7 @@ import { theEngine } from "../../session/engine";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
-import { notify, now, select, setUi, useEditor } from "../../store/store";
+import { getState, notify, select, setUi, useEditor } from "../../store/store";
 import { nameOf, selectionOf, withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
@@ -86,7 +86,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
         <span>{t`Show steps in the 3D view`}</span>
       </label>
       {doc.project?.has_logic && !ui.picked && (
-        <Button look="plain" icon="function" why={notEditable(state, "MakeFunction")} onPress={() => startPicking()}>
+        <Button variant="plain" icon="function" why={notEditable(state, "MakeFunction")} onPress={() => startPicking()}>
           {t`Select several actions`}
         </Button>
       )}
@@ -224,7 +224,7 @@ function LinkRow({
 }
 
 function goTo(id: string): void {
-  select(selectionOf(now(), id));
+  select(selectionOf(getState(), id));
   setUi({ tool: "" });
   theEngine()?.focus(id);
 }

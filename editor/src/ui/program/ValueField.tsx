@@ -8,7 +8,7 @@ import type { ReactNode } from "react";
 import { Suspense, useEffect, useId, useState } from "react";
 import { decimal } from "../../formats";
 import { words } from "../../program/naming";
-import { type Extra, rangeWords, read, shownUnit, textOf, withoutUnit } from "../../program/values";
+import { type Extra, parseValue, rangeWords, shownUnit, textOf, withoutUnit } from "../../program/values";
 import { Button } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import "./value.css";
@@ -72,7 +72,7 @@ export function ValueField({
   // The value was changed by another user, or accepted. A text that means the same stays as it is typed.
   useEffect(() => {
     setText((typed) => {
-      const found = read(type, typed, extra);
+      const found = parseValue(type, typed, extra);
       return "json" in found && found.json === json ? typed : known;
     });
     setProblem("");
@@ -84,13 +84,13 @@ export function ValueField({
   };
   const leave = () => {
     if (text === known) return setProblem("");
-    const found = read(type, text, extra);
+    const found = parseValue(type, text, extra);
     if ("problem" in found) setProblem(found.problem);
     else void set(found.json);
   };
   const takeTyped = (typed: string) => {
     setText(typed);
-    const found = onTyped && read(type, typed, extra);
+    const found = onTyped && parseValue(type, typed, extra);
     if (found && "json" in found) onTyped(found.json);
   };
   const reset = () => {

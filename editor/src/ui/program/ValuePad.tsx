@@ -34,7 +34,7 @@ export default function ValuePad({ label, text, onTyped, onSet, onCancel }: Valu
       </PadKeys>
       <div className="actions">
         <Button onPress={onCancel}>{t`Cancel`}</Button>
-        <Button look="primary" onPress={onSet}>{t`Set`}</Button>
+        <Button variant="primary" onPress={onSet}>{t`Set`}</Button>
       </div>
     </div>
   );

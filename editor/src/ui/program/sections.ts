@@ -37,7 +37,7 @@ export const programSections: readonly Section[] = [
     applies: ({ id }, { doc }) => id === END && doc !== null && doc.path.length > 0,
     Body: lazyComponent(() => import("../functions/Signature")),
   },
-  { id: "try", title: msg`Do`, applies: isAction, Body: lazyComponent(() => import("./ActionCommands")) },
+  { id: "try", title: msg`Commands`, applies: isAction, Body: lazyComponent(() => import("./ActionCommands")) },
   {
     id: "parameters",
     title: msg`Parameters`,

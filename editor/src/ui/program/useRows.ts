@@ -12,7 +12,7 @@ const STEP = 100;
 export const at = (tops: Float64Array, index: number): number => tops[index] ?? 0;
 
 /** Return the first row whose lower edge is below a place. */
-export function rowAt(tops: Float64Array, place: number): number {
+function rowAt(tops: Float64Array, place: number): number {
   let [low, high] = [0, tops.length - 1];
   while (low < high) {
     const middle = (low + high) >> 1;
@@ -47,20 +47,20 @@ export function useRows(list: RefObject<HTMLElement | null>, heights: readonly n
   useLayoutEffect(() => {
     const host = list.current?.closest(".panel-body");
     if (!host) return;
-    const look = () => {
+    const updateView = () => {
       const start = list.current?.getBoundingClientRect().top ?? 0;
       const { top, bottom } = host.getBoundingClientRect();
       const from = Math.floor((top - start - AHEAD) / STEP) * STEP;
       const to = Math.ceil((bottom - start + AHEAD) / STEP) * STEP;
       setView((known) => (known.from === from && known.to === to ? known : { from, to }));
     };
-    look();
-    const observer = new ResizeObserver(look);
+    updateView();
+    const observer = new ResizeObserver(updateView);
     observer.observe(host);
-    host.addEventListener("scroll", look, { passive: true });
+    host.addEventListener("scroll", updateView, { passive: true });
     return () => {
       observer.disconnect();
-      host.removeEventListener("scroll", look);
+      host.removeEventListener("scroll", updateView);
     };
   }, [list, empty]);
   const latest = useRef(tops);

@@ -13,7 +13,7 @@ export function OpenRecording({ recording }: { recording: RecordingInfo | undefi
   if (!recording) return null;
   return (
     <>
-      <Button look="plain" icon="eye" onPress={() => setOpen(true)}>{t`Recording`}</Button>
+      <Button variant="plain" icon="eye" onPress={() => setOpen(true)}>{t`Recording`}</Button>
       {open && (
         <Suspense fallback={null}>
           <RecordingView number={recording.number} onClose={() => setOpen(false)} />

@@ -9,7 +9,7 @@ import { translate } from "../../i18n/serverMessages";
 import { splitAddress } from "../../program/messages";
 import type { RecordingChangedData } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { MOST } from "../trends/Chart";
@@ -53,7 +53,7 @@ export default function RecordingView({ number, onClose }: { number: number; onC
   );
   useRecordingChanges(reload);
   return (
-    <Window title={recording ? t`Recording of ${dateAndTime(recording.at)}` : t`Recording`} onClose={onClose}>
+    <ModalDialog title={recording ? t`Recording of ${dateAndTime(recording.at)}` : t`Recording`} onClose={onClose}>
       <div className="recording">
         {recording && <Content recording={recording} />}
         {!recording && !failed && <Waiting>{t`Loading…`}</Waiting>}
@@ -67,11 +67,11 @@ export default function RecordingView({ number, onClose }: { number: number; onC
         >
           {t`Export CSV`}
         </Button>
-        <Button look="primary" onPress={onClose} autoFocus>
+        <Button variant="primary" onPress={onClose} autoFocus>
           {t`Close`}
         </Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }
 
@@ -117,13 +117,13 @@ function Content({ recording }: { recording: Recording }) {
             onChange={(event) => setCursor(Number(event.target.value))}
           />
         </label>
-        <Button look="plain" aria-label={t`Zoom out`} onPress={() => zoom(2)}>
+        <Button variant="plain" aria-label={t`Zoom out`} onPress={() => zoom(2)}>
           −
         </Button>
-        <Button look="plain" aria-label={t`Zoom in`} onPress={() => zoom(0.5)}>
+        <Button variant="plain" aria-label={t`Zoom in`} onPress={() => zoom(0.5)}>
           +
         </Button>
-        <Button look="plain" onPress={() => setRange(whole)}>{t`Everything`}</Button>
+        <Button variant="plain" onPress={() => setRange(whole)}>{t`Everything`}</Button>
       </div>
       <p className="recording-running small" aria-live="off">
         {running.length === 0 && <span className="quiet">{t`No action was running.`}</span>}
@@ -218,7 +218,7 @@ function Chooser({ signals, shown, onChange }: ChooserProps) {
         ))}
       </div>
       {changed.length < signals.length && (
-        <Button look="plain" onPress={() => setAll(!all)}>
+        <Button variant="plain" onPress={() => setAll(!all)}>
           {all ? t`Only values that changed` : t`Also values that did not change`}
         </Button>
       )}

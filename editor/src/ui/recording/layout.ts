@@ -143,7 +143,7 @@ function within([from, to]: Range, [first, last]: Range): Range {
 }
 
 /** An action in a row of its lane. */
-export interface Band {
+interface Band {
   action: RecordedAction;
   row: number;
 }

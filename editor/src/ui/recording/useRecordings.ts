@@ -3,12 +3,12 @@
 import { useEffect, useState } from "react";
 import { loadRecordings } from "../../commands/recordings";
 import type { RecordingChangedData, RecordingInfo } from "../../protocol/types";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 
 /** Call `take` with each stored recording while the component is shown. */
 export function useRecordingChanges(take: (changed: RecordingChangedData) => void): void {
   useEffect(() => {
-    const { runtime } = now();
+    const { runtime } = getState();
     runtime.takeRecording ??= new Set();
     const listeners = runtime.takeRecording;
     listeners.add(take);
@@ -17,10 +17,7 @@ export function useRecordingChanges(take: (changed: RecordingChangedData) => voi
 }
 
 /** Return recordings with a changed one and without deleted ones, newest first. */
-export function withRecording(
-  known: readonly RecordingInfo[],
-  { recording, deleted }: RecordingChangedData,
-): RecordingInfo[] {
+function withRecording(known: readonly RecordingInfo[], { recording, deleted }: RecordingChangedData): RecordingInfo[] {
   const others = known.filter(({ number }) => number !== recording.number && !deleted.includes(number));
   return [...others, recording].sort((a, b) => b.number - a.number);
 }

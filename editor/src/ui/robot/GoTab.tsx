@@ -3,15 +3,15 @@
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useCallback, useEffect, useRef, useState } from "react";
-import { type Chosen, effectorPose, hideGhost, moveToPose, notReady } from "../../commands/robot";
+import { effectorPose, hideGhost, moveToPose, notReady, type RobotSelection } from "../../commands/robot";
 import type { PathState } from "../../engine/pathLine";
 import type { Pose } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { alongZ, fromRollPitchYaw, worldOf } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
 import { rollPitchYaw } from "../../viewmodel/rotations";
-import { Amount, OneOf, OnOff } from "../kit/fields";
+import { NumberField, SwitchField, ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { type GoalAnswer, LiveGoal } from "./liveGoal";
 import { motionOptions, useMotionOptions } from "./motionOptions";
@@ -23,7 +23,7 @@ import { useTelemetry } from "./useTelemetry";
 const AXES = ["x", "y", "z"] as const;
 const ANGLES = [msg`Roll`, msg`Pitch`, msg`Yaw`] as const;
 
-export function GoTab({ chosen }: { chosen: Chosen }) {
+export function GoTab({ chosen }: { chosen: RobotSelection }) {
   const why = useEditor((state) => notReady(state, chosen));
   const { safe } = useMotionOptions();
   const selection = useEditor((state) => state.ui.selection);
@@ -59,7 +59,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
     setGoal(effectorPose(chosen) ?? goal);
   };
   useGoalGizmo(goal, turning ? "turn" : "move", turning ? "goal" : "world", show);
-  useWay(chosen, goal, answer);
+  useStraightPath(chosen, goal, answer);
   usePlaceTap(tapping, ({ position, normal }) => {
     const turned = goal?.orientation ?? { x: 1, y: 0, z: 0, w: 0 };
     show({ position, orientation: normal ? alongZ({ x: -normal.x, y: -normal.y, z: -normal.z }, turned) : turned });
@@ -89,10 +89,10 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           : "";
   return (
     <>
-      <OnOff isSelected={tapping} onChange={setTapping}>
+      <SwitchField isSelected={tapping} onChange={setTapping}>
         {t`Tap in the view to set the target`}
-      </OnOff>
-      <OneOf
+      </SwitchField>
+      <ToggleGroup
         label={t`Drag the target`}
         value={turning ? "turn" : "move"}
         choices={[
@@ -105,7 +105,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
       <PathText answer={answer} />
       <div className="amounts">
         {AXES.map((axis) => (
-          <Amount
+          <NumberField
             key={axis}
             label={axis.toUpperCase()}
             unit="mm"
@@ -115,7 +115,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           />
         ))}
         {ANGLES.map((name, n) => (
-          <Amount
+          <NumberField
             key={n}
             label={i18n._(name)}
             unit="°"
@@ -132,7 +132,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
       <PadDock chosen={chosen} refused={refused} hint={why || notYet}>
         <div className="actions start">
           <Button
-            look="primary"
+            variant="primary"
             why={why || notYet}
             onPress={() => void moveToPose(chosen, goal, motionOptions()).then(setRefused)}
           >
@@ -142,7 +142,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           {selected && (
             <Button
               onPress={() => {
-                const { doc, ui } = now();
+                const { doc, ui } = getState();
                 if (doc)
                   show(
                     ui.selection?.kind === "orientation"
@@ -177,7 +177,7 @@ function PathText({ answer }: { answer: GoalAnswer | null }) {
 }
 
 /** Show the straight path from the current tool position in the view. */
-function useWay(chosen: Chosen, goal: Pose | null, answer: GoalAnswer | null): void {
+function useStraightPath(chosen: RobotSelection, goal: Pose | null, answer: GoalAnswer | null): void {
   const { linear } = useMotionOptions();
   const tool = useTelemetry(chosen.robotId, () => effectorPose(chosen));
   const state: PathState = !answer ? "unknown" : linear || answer.problem ? answer.path : "unknown";

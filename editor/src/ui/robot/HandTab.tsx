@@ -3,12 +3,12 @@
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { holdHandTeaching } from "../../commands/holdToRun";
-import { type Chosen, featuresOf, notReady } from "../../commands/robot";
+import { featuresOf, notReady, type RobotSelection } from "../../commands/robot";
 import { useEditor } from "../../store/store";
 import { HoldButton } from "./HoldButton";
 import { PadDock } from "./PadDock";
 
-export function HandTab({ chosen }: { chosen: Chosen }) {
+export function HandTab({ chosen }: { chosen: RobotSelection }) {
   const can = useEditor((state) => featuresOf(state, chosen.robotId)?.hand_teaching ?? false);
   const ready = useEditor((state) => notReady(state, chosen, "HoldHandTeaching"));
   const free = useEditor((state) => state.live.handTeaching[chosen.robotId] ?? false);

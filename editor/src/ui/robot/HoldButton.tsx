@@ -5,7 +5,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type ReactNode, useEffect, useRef, useState } from "react";
-import type { Held } from "../../commands/holdToRun";
+import type { HoldToRunMotion } from "../../commands/holdToRun";
 import { notify } from "../../store/store";
 
 interface HoldButtonProps {
@@ -14,14 +14,14 @@ interface HoldButtonProps {
   /** The reason why it is not available; empty if it is available. */
   why?: string;
   className?: string;
-  onHold: () => Held;
+  onHold: () => HoldToRunMotion;
   /** Called at the end, with the reason if it was not released. */
   onOver?: (reason: string) => void;
   children: ReactNode;
 }
 
 export function HoldButton({ label, why = "", className = "", onHold, onOver, children }: HoldButtonProps) {
-  const held = useRef<Held | null>(null);
+  const held = useRef<HoldToRunMotion | null>(null);
   const [down, setDown] = useState(false);
   const begin = () => {
     if (why) {

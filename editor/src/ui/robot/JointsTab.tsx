@@ -4,13 +4,13 @@ import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { holdJog } from "../../commands/holdToRun";
-import { type Chosen, featuresOf, moveToJoints, notReady } from "../../commands/robot";
+import { featuresOf, moveToJoints, notReady, type RobotSelection } from "../../commands/robot";
 import { fixed } from "../../formats";
 import type { Joint } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
 import { useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
-import { Amount, OneOf } from "../kit/fields";
+import { NumberField, ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "./HoldButton";
 import { FASTEST, motionOptions, setMotionOptions, useMotionOptions } from "./motionOptions";
@@ -19,7 +19,7 @@ import { useTelemetry } from "./useTelemetry";
 
 const DEGREES = 180 / Math.PI;
 
-export interface ShownJoint extends Joint {
+interface ShownJoint extends Joint {
   /** Degrees, or millimetres if prismatic, per unit of the value. */
   scale: number;
   unit: string;
@@ -43,7 +43,7 @@ export function shownJoints(robotId: string, joints: readonly Joint[]): ShownJoi
   });
 }
 
-export function JointsTab({ chosen }: { chosen: Chosen }) {
+export function JointsTab({ chosen }: { chosen: RobotSelection }) {
   const { robotId, armId } = chosen;
   const { press, angle, distance, speed } = useMotionOptions();
   const features = useEditor((state) => featuresOf(state, robotId));
@@ -74,7 +74,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   };
   return (
     <>
-      <OneOf
+      <ToggleGroup
         label={t`Mode`}
         quiet
         value={hold ? "hold" : "step"}
@@ -89,7 +89,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
         }
       />
       {!hold && (
-        <Amount
+        <NumberField
           label={t`Step`}
           unit="°"
           digits={2}
@@ -146,7 +146,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
                     </Button>
                   );
                 })}
-                <Amount
+                <NumberField
                   label={t`${joint.name.replaceAll("_", " ")} to`}
                   unit={joint.unit}
                   value={joint.value * joint.scale}

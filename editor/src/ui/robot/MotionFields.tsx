@@ -1,14 +1,14 @@
 /** Options of all motions: speed, straight line, collision check. */
 
 import { t } from "@lingui/core/macro";
-import { MoreOrLess, OnOff } from "../kit/fields";
+import { SliderField, SwitchField } from "../kit/fields";
 import { setMotionOptions, useMotionOptions } from "./motionOptions";
 
 export function MotionFields() {
   const { speed, safe, linear } = useMotionOptions();
   return (
     <div className="manner">
-      <MoreOrLess
+      <SliderField
         label={t`Speed`}
         value={speed}
         least={0.01}
@@ -17,12 +17,12 @@ export function MotionFields() {
         words={(value) => `${Math.round(value * 100)} %`}
         onChange={(next) => setMotionOptions({ speed: next })}
       />
-      <OnOff isSelected={safe} onChange={(next) => setMotionOptions({ safe: next })}>
+      <SwitchField isSelected={safe} onChange={(next) => setMotionOptions({ safe: next })}>
         {t`Check for collisions`}
-      </OnOff>
-      <OnOff isSelected={linear} onChange={(next) => setMotionOptions({ linear: next })}>
+      </SwitchField>
+      <SwitchField isSelected={linear} onChange={(next) => setMotionOptions({ linear: next })}>
         {t`Straight line`}
-      </OnOff>
+      </SwitchField>
     </div>
   );
 }

@@ -3,7 +3,7 @@
 import { msg, t } from "@lingui/core/macro";
 import { createContext, type ReactNode, useContext } from "react";
 import { createPortal } from "react-dom";
-import type { Chosen } from "../../commands/robot";
+import type { RobotSelection } from "../../commands/robot";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 
@@ -14,7 +14,7 @@ export const HOLD_HINT = msg`Motion stops as soon as you release the button.`;
 export const PadPlace = createContext<HTMLElement | null>(null);
 
 interface PadDockProps {
-  chosen: Chosen;
+  chosen: RobotSelection;
   /** The reason why the last request was refused; empty if it was accepted. */
   refused: string;
   /** Shown while there is nothing to report. */

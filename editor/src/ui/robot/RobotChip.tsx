@@ -23,7 +23,7 @@ export default function RobotChip() {
   const [asking, setAsking] = useState(false);
   if (!chosen || running) return null;
   const words = [name, chosen.armId, chosen.effector].filter(Boolean).join(" · ");
-  const keep = () => {
+  const savePoint = () => {
     if (why) {
       notify("info", why);
       return;
@@ -58,7 +58,7 @@ export default function RobotChip() {
           className="button primary"
           aria-disabled={why !== "" || asking || undefined}
           aria-label={t`Save the robot pose as a point`}
-          onClick={keep}
+          onClick={savePoint}
           disabled={asking}
         >
           <Icon name="plus" />

@@ -5,7 +5,7 @@ import { armOf, chooseRobot, chosenRobot } from "../../commands/robot";
 import { robotsOf } from "../../session/streams";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 
 export function RobotChooser() {
   const chosen = useEditor(chosenRobot);
@@ -23,7 +23,7 @@ export function RobotChooser() {
   return (
     <div className="robot-chooser">
       {ids.length > 1 && (
-        <Pick
+        <SelectField
           label={t`Robot`}
           value={chosen.robotId}
           choices={ids.map((id, n) => [id, labels[n] ?? ""])}
@@ -31,7 +31,7 @@ export function RobotChooser() {
         />
       )}
       {arms && arms.length > 1 && (
-        <Pick
+        <SelectField
           label={t`Arm`}
           value={chosen.armId}
           choices={arms.map(({ id }) => [id, id])}
@@ -39,7 +39,7 @@ export function RobotChooser() {
         />
       )}
       {arm && arm.effectors.length > 1 && (
-        <Pick
+        <SelectField
           label={t`End effector`}
           value={chosen.effector}
           choices={arm.effectors.map((id) => [id, id])}

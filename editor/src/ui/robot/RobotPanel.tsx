@@ -8,7 +8,7 @@ import { robotsOf } from "../../session/streams";
 import { setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { LeaveZone } from "../interlocks/LeaveZone";
-import { OneOf } from "../kit/fields";
+import { ToggleGroup } from "../kit/fields";
 import { GoTab } from "./GoTab";
 import { HandTab } from "./HandTab";
 import { JointsTab } from "./JointsTab";
@@ -51,7 +51,7 @@ export default function RobotPanel() {
         <RobotChooser />
         {!why && <Status chosen={chosen} />}
         {!why && <LeaveZone chosen={chosen} />}
-        <OneOf
+        <ToggleGroup
           label={t`Control`}
           quiet
           value={tab}

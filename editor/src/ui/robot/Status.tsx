@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
-import { acknowledgeStop, armOf, type Chosen, effectorPose, featuresOf, notReady } from "../../commands/robot";
+import { acknowledgeStop, armOf, effectorPose, featuresOf, notReady, type RobotSelection } from "../../commands/robot";
 import { fixed } from "../../formats";
 import { translatedAlarm } from "../../i18n/serverMessages";
 import { useEditor } from "../../store/store";
@@ -10,7 +10,7 @@ import { rollPitchYaw } from "../../viewmodel/rotations";
 import { Button } from "../kit/kit";
 import { useTelemetry } from "./useTelemetry";
 
-export function Status({ chosen }: { chosen: Chosen }) {
+export function Status({ chosen }: { chosen: RobotSelection }) {
   const { robotId } = chosen;
   const alarms = useEditor((state) => state.live.health[robotId]?.alarms);
   const acknowledges = useEditor((state) => featuresOf(state, robotId)?.acknowledge_stop ?? false);
@@ -25,8 +25,8 @@ export function Status({ chosen }: { chosen: Chosen }) {
     <div className="robot-status">
       <Pose chosen={chosen} />
       {tools.map(
-        ([what, names]) =>
-          names.length > 0 && <p key={what} className="quiet small">{`${what}: ${names.join(", ")}`}</p>,
+        ([title, names]) =>
+          names.length > 0 && <p key={title} className="quiet small">{`${title}: ${names.join(", ")}`}</p>,
       )}
       {alarms?.map(translatedAlarm).map((alarm) => (
         <p key={alarm.code} className="small alarm" role="alert">
@@ -47,7 +47,7 @@ export function Status({ chosen }: { chosen: Chosen }) {
   );
 }
 
-function Pose({ chosen }: { chosen: Chosen }) {
+function Pose({ chosen }: { chosen: RobotSelection }) {
   const pose = useTelemetry(chosen.robotId, () => effectorPose(chosen));
   if (!pose) return <p className="quiet small">{t`Tool pose unknown.`}</p>;
   const { x, y, z } = pose.position;

@@ -6,20 +6,20 @@ import { useState } from "react";
 import { holdJog } from "../../commands/holdToRun";
 import {
   alignDown,
-  type Chosen,
   effectorPose,
   featuresOf,
   moveToPose,
   notReady,
+  type RobotSelection,
   stepEffector,
 } from "../../commands/robot";
 import { decimal } from "../../formats";
 import type { Pose, Position, StepAxis } from "../../protocol/types";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import type { Jogging } from "../../store/ui";
 import { worldOf } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
-import { Amount, OneOf } from "../kit/fields";
+import { NumberField, ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "./HoldButton";
 import { ANGLES, DISTANCES, FASTEST, motionOptions, setMotionOptions, useMotionOptions } from "./motionOptions";
@@ -33,7 +33,7 @@ function framed(kind: string | undefined): boolean {
   return kind === "object" || kind === "point" || kind === "orientation";
 }
 
-export function ToolTab({ chosen }: { chosen: Chosen }) {
+export function ToolTab({ chosen }: { chosen: RobotSelection }) {
   const { frame, press: pressed, what, distance, angle, speed } = useMotionOptions();
   const selection = useEditor((state) => state.ui.selection);
   const selected = useEditor((state) =>
@@ -83,7 +83,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
 
   return (
     <>
-      <OneOf
+      <ToggleGroup
         label={t`Mode`}
         quiet
         value={hold ? "hold" : "step"}
@@ -97,8 +97,8 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
             : [["step", t`Step`]]
         }
       />
-      <OneOf
-        label={t`What`}
+      <ToggleGroup
+        label={t`Motion`}
         quiet
         value={what}
         onChange={(next) => setMotionOptions({ what: next })}
@@ -107,7 +107,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
           ["orientation", t`Turn`],
         ]}
       />
-      <OneOf
+      <ToggleGroup
         label={t`Frame`}
         value={used}
         onChange={(next) => setMotionOptions({ frame: next })}
@@ -180,22 +180,22 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
 }
 
 /** Return the pose in the world of the frame whose axes are used; undefined for frames that the server knows. */
-function poseOf(frame: Jogging["frame"], chosen: Chosen): Pose | undefined {
+function poseOf(frame: Jogging["frame"], chosen: RobotSelection): Pose | undefined {
   if (frame === "tool") return effectorPose(chosen);
-  const { doc, ui } = now();
+  const { doc, ui } = getState();
   return frame === "selected" && doc ? worldOf(doc, ui.selection?.id) : undefined;
 }
 
 function Distances({ distance }: { distance: number }) {
   return (
     <div className="step-size">
-      <OneOf
+      <ToggleGroup
         label={t`Step, mm`}
         value={String(distance)}
         onChange={(next) => setMotionOptions({ distance: Number(next) })}
         choices={DISTANCES.map((each) => [String(each), decimal(each * 1000, 3)] as const)}
       />
-      <Amount
+      <NumberField
         label={t`Or`}
         unit="mm"
         digits={2}
@@ -211,13 +211,13 @@ function Distances({ distance }: { distance: number }) {
 function Angles({ angle }: { angle: number }) {
   return (
     <div className="step-size">
-      <OneOf
+      <ToggleGroup
         label={t`Step, °`}
         value={String(angle)}
         onChange={(next) => setMotionOptions({ angle: Number(next) })}
         choices={ANGLES.map((each) => [String(each), decimal(each * DEGREES, 1)] as const)}
       />
-      <Amount
+      <NumberField
         label={t`Or`}
         unit="°"
         digits={2}

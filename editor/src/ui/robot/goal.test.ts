@@ -7,7 +7,7 @@ const NO_WAY = new Vector3();
 
 test("dragging a target along an axis keeps its orientation", () => {
   const goal = dragged(START, {
-    handle: { do: "axis", axis: "z" },
+    handle: { kind: "axis", axis: "z" },
     translation: new Vector3(0, 0, 0.05),
     axis: new Vector3(0, 0, 1),
     angle: 0,
@@ -18,7 +18,7 @@ test("dragging a target along an axis keeps its orientation", () => {
 
 test("turning a target with a ring keeps its position", () => {
   const { position, orientation } = dragged(START, {
-    handle: { do: "ring", axis: "z" },
+    handle: { kind: "ring", axis: "z" },
     translation: NO_WAY,
     axis: new Vector3(0, 0, 1),
     angle: Math.PI / 2,

@@ -1,6 +1,6 @@
 /** Check a target while it is dragged: only the latest one, one request at a time. */
 
-import { type Chosen, effectorPose, showAt } from "../../commands/robot";
+import { effectorPose, type RobotSelection, showGhostAt } from "../../commands/robot";
 import type { PathState } from "../../engine/pathLine";
 import type { Pose } from "../../protocol/types";
 import { obstacleOn } from "../../session/paths";
@@ -27,7 +27,7 @@ export class LiveGoal {
 
   /** `straight`: whether the motion is straight, so that the path can be checked. */
   constructor(
-    private readonly chosen: Chosen,
+    private readonly chosen: RobotSelection,
     private readonly straight: () => boolean,
     private readonly onAnswer: (answer: GoalAnswer) => void,
   ) {}
@@ -62,7 +62,7 @@ export class LiveGoal {
     this.ended = false;
     this.last = performance.now();
     const current = () => !this.ended;
-    const problem = await showAt(this.chosen, goal, { current, keep: true });
+    const problem = await showGhostAt(this.chosen, goal, { current, keep: true });
     const from = effectorPose(this.chosen);
     let path: PathState = "unknown";
     let obstacle = "";

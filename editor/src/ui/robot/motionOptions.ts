@@ -1,6 +1,6 @@
 /** The user's choices for moving robots: frame, step size, speed. Stored while the page is open. */
 
-import { now, setUi, useEditor } from "../../store/store";
+import { getState, setUi, useEditor } from "../../store/store";
 import type { Jogging, MotionOptions } from "../../store/ui";
 
 const RAD = Math.PI / 180;
@@ -13,8 +13,8 @@ export const FASTEST = { linear: 0.25, angular: 0.8, joint: 0.6 } as const;
 
 export const useMotionOptions = (): Jogging => useEditor((state) => state.ui.jogging);
 export const setMotionOptions = (change: Partial<Jogging>): void =>
-  setUi({ jogging: { ...now().ui.jogging, ...change } });
+  setUi({ jogging: { ...getState().ui.jogging, ...change } });
 export const motionOptions = (): MotionOptions => {
-  const { speed, safe, linear } = now().ui.jogging;
+  const { speed, safe, linear } = getState().ui.jogging;
   return { speed, safe, linear };
 };

@@ -14,7 +14,7 @@ export function dragged(
   start: Pose,
   { handle, translation, axis, angle }: Pick<Drag, "handle" | "translation" | "axis" | "angle">,
 ): Pose {
-  if (handle.do === "ring") return turnedAbout(start, axis, angle);
+  if (handle.kind === "ring") return turnedAbout(start, axis, angle);
   return { ...start, position: plusOf(start.position, translation, 1) };
 }
 

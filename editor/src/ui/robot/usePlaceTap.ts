@@ -4,7 +4,7 @@ import { useEffect, useRef } from "react";
 import type { Position } from "../../protocol/types";
 import { takeTaps } from "../../session/taps";
 
-export interface TappedPlace {
+interface TappedPlace {
   position: Position;
   /** Outward normal; null without a surface. */
   normal: Position | null;

@@ -7,7 +7,7 @@ import { telemetry } from "../../store/telemetry";
 const PAUSE = 0.1;
 
 /** Return a value of a robot's telemetry; the component is rendered a few times per second. */
-export function useTelemetry<T>(robotId: string | undefined, look: () => T): T {
+export function useTelemetry<T>(robotId: string | undefined, read: () => T): T {
   const [, again] = useState(0);
   useEffect(() => {
     let timer: ReturnType<typeof setTimeout> | undefined;
@@ -23,5 +23,5 @@ export function useTelemetry<T>(robotId: string | undefined, look: () => T): T {
       clearTimeout(timer);
     };
   }, [robotId]);
-  return look();
+  return read();
 }

@@ -12,12 +12,12 @@ import {
   type Timing,
 } from "../../commands/dryRun";
 import { clock, decimal, duration, fixed } from "../../formats";
-import { branchings, existing } from "../../program/branchings";
+import { branchings, existingChoices } from "../../program/branchings";
 import type { GetDryRunData, Prediction, TraceSummary } from "../../protocol/types";
 import { notify, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Gantt } from "../gantt/Gantt";
-import { Pick } from "../kit/fields";
+import { SelectField } from "../kit/fields";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { ShowAction } from "./Result";
@@ -83,12 +83,12 @@ function useBranches() {
   const { doc, types } = state;
   const [chosen, setChosen] = useState<Record<string, string>>({});
   const found = useMemo(() => (doc?.project?.has_logic ? branchings(doc, types) : []), [doc, types]);
-  const branches = existing(found, chosen);
+  const branches = existingChoices(found, chosen);
   const fields = found.length > 0 && (
     <details>
       <summary>{t`Branches`}</summary>
       {found.map(({ id, name, branches: options }) => (
-        <Pick
+        <SelectField
           key={id}
           label={name}
           value={branches[id] ?? ""}
@@ -208,7 +208,7 @@ function Comparison({ timing, found }: { timing: Timing; found: GetDryRunData })
   if (choices.length === 1) return null;
   return (
     <>
-      <Pick label={t`Compare with`} value={other?.key ?? ""} choices={choices} onChange={choose} />
+      <SelectField label={t`Compare with`} value={other?.key ?? ""} choices={choices} onChange={choose} />
       {other && (
         <>
           <Gantt

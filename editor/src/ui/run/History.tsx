@@ -70,7 +70,7 @@ function RunChart({ number }: { number: number }) {
   return (
     <div className="timing">
       <div className="row">
-        <Button look="plain" icon="list" aria-expanded={timing !== null} onPress={show}>
+        <Button variant="plain" icon="list" aria-expanded={timing !== null} onPress={show}>
           {timing ? t`Hide chart` : t`Chart`}
         </Button>
       </div>

@@ -19,7 +19,7 @@ export function Lanes({ lanes }: { lanes: readonly Lane[] }) {
     <ul className="run-lanes" aria-label={t`Branches`}>
       {lanes.map((lane) => (
         <li key={lane.id} aria-label={lane.name}>
-          <Button look="plain" className="run-lane" onPress={() => show(lane)}>
+          <Button variant="plain" className="run-lane" onPress={() => show(lane)}>
             <strong>{lane.name}</strong>
             <span className="small quiet">
               {paused ? (lane.doing ? t`before ${lane.doing}` : t`waiting`) : lane.doing || t`running`}

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { ago } from "../../formats";
 import { lastRun, type Result, resultOf } from "../../program/results";
 import { theEngine } from "../../session/engine";
-import { now, select, setUi, useEditor } from "../../store/store";
+import { getState, select, setUi, useEditor } from "../../store/store";
 import { nameOf, selectionOf, withNames } from "../../viewmodel/names";
 import { Icon, type IconName } from "../kit/icons";
 import { Button } from "../kit/kit";
@@ -23,7 +23,7 @@ export function LastResult({ projectId }: { projectId: string }) {
         <Icon name={ICONS[result.tone]} /> <strong>{result.title}</strong>{" "}
         <span className="small">{ago(run.ended ?? run.started)}</span>
       </p>
-      {result.detail && <p>{withNames(now(), result.detail)}</p>}
+      {result.detail && <p>{withNames(getState(), result.detail)}</p>}
       {result.tone === "bad" && <ShowAction id={result.actionId} />}
     </section>
   );
@@ -35,7 +35,7 @@ export function ShowAction({ id }: { id: string }) {
   if (!name) return null;
   const show = () => {
     setUi({ tool: "" });
-    select(selectionOf(now(), id));
+    select(selectionOf(getState(), id));
     theEngine()?.focus(id);
   };
   return (

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { storeGeneralState } from "../../commands/viewstate";
 import { ago } from "../../formats";
 import { dismissal, resultOf, undismissedRun } from "../../program/results";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
@@ -24,12 +24,12 @@ export default function ResultBanner() {
         <strong>{result.title}</strong>{" "}
         <span className="small">
           {`${result.name}, ${ago(run.ended ?? run.started)}. `}
-          {withNames(now(), result.detail)}
+          {withNames(getState(), result.detail)}
         </span>
       </p>
       {result.tone === "bad" && <ShowAction id={result.actionId} />}
       <Button
-        look="plain"
+        variant="plain"
         icon="close"
         aria-label={t`Dismiss the result`}
         onPress={() => storeGeneralState(dismissal(run))}

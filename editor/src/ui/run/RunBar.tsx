@@ -91,7 +91,7 @@ export function RunButtons({ whyNoResume = "" }: { whyNoResume?: string }) {
       )}
       {phase === "paused" && !held && (
         <>
-          <Button icon="play" look="primary" why={whyNot} onPress={() => void commands.resume()}>
+          <Button icon="play" variant="primary" why={whyNot} onPress={() => void commands.resume()}>
             {t`Resume`}
           </Button>
           <Button icon="step" why={whyNot} onPress={() => void commands.step()}>

@@ -51,7 +51,7 @@ export default function RunPanel() {
       ) : (
         <>
           <div className="row">
-            <Button look="primary" icon="play" why={why} isDisabled={busy} onPress={() => void begin(false)}>
+            <Button variant="primary" icon="play" why={why} isDisabled={busy} onPress={() => void begin(false)}>
               {doc?.unsaved ? t`Save and run` : t`Run`}
             </Button>
             <Button icon="step" why={why} isDisabled={busy} onPress={() => void begin(true)}>
@@ -74,7 +74,7 @@ export default function RunPanel() {
             {broken.map((id) => (
               <li key={id}>
                 <Button
-                  look="plain"
+                  variant="plain"
                   icon="close"
                   aria-label={t`Remove breakpoint at ${nameOf(state, id)}`}
                   why={whyUnavailable(state, "SetBreakpoints")}
@@ -100,8 +100,8 @@ export default function RunPanel() {
         <AskName
           title={t`Build a package`}
           initial={doc.project.name}
-          yes={doc.unsaved ? t`Save and build` : t`Build`}
-          onYes={(name) => void build(name)}
+          confirmLabel={doc.unsaved ? t`Save and build` : t`Build`}
+          onConfirm={(name) => void build(name)}
           onClose={() => setAsking(false)}
         />
       )}

@@ -4,9 +4,9 @@ import { plural, t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { addMesh, freeObjectName } from "../../commands/scene";
 import type { MeshFile } from "../../scene/meshes";
-import { LENGTH_UNITS, type LengthUnit, show, UNIT_FACTORS } from "../../transform/amounts";
+import { amountText, LENGTH_UNITS, type LengthUnit, UNIT_FACTORS } from "../../transform/amounts";
 import { Field } from "../kit/Field";
-import { OneOf } from "../kit/fields";
+import { ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { MeshPreview } from "./MeshPreview";
@@ -42,7 +42,7 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
   };
   return (
     <form className="add-form" onSubmit={submit}>
-      <Button look="plain" onPress={onBack}>
+      <Button variant="plain" onPress={onBack}>
         {t`← All types`}
       </Button>
       <h3>{t`Mesh`}</h3>
@@ -59,19 +59,19 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
       {mesh && (
         <>
           <MeshPreview geometry={mesh.geometry} />
-          <OneOf
+          <ToggleGroup
             label={t`Unit of the file`}
             value={unit}
             choices={LENGTH_UNITS.map((each) => [each, `1 ${each}`] as const)}
             onChange={setUnit}
           />
           <p className="small">
-            {t`Size: ${mesh.size.map((each) => show(each * UNIT_FACTORS[unit], "mm")).join(" × ")} mm.`}{" "}
+            {t`Size: ${mesh.size.map((each) => amountText(each * UNIT_FACTORS[unit], "mm")).join(" × ")} mm.`}{" "}
             <span className="quiet">{plural(mesh.triangles, { one: "# triangle", other: "# triangles" })}</span>
           </p>
           <Field label={t`Name`} value={name} onChange={setName} autoComplete="off" />
           <RefusedText>{refused}</RefusedText>
-          <Button look="primary" icon="plus" type="submit" why={why} isDisabled={busy || !name.trim()}>
+          <Button variant="primary" icon="plus" type="submit" why={why} isDisabled={busy || !name.trim()}>
             {busy ? t`Uploading…` : t`Upload and add`}
           </Button>
         </>

@@ -39,7 +39,7 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
   };
   return (
     <form className="add-form" onSubmit={submit}>
-      <Button look="plain" onPress={onBack}>
+      <Button variant="plain" onPress={onBack}>
         {t`← All types`}
       </Button>
       <h3>{type.display_name ?? type.type}</h3>
@@ -67,7 +67,7 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
       )}
       {hasNodes && byCell && <p className="quiet small">{byCell}</p>}
       {type.settings.length > 0 && <Check type={type} values={values} node={assigned || node} />}
-      <Button look="primary" icon="plus" type="submit" why={why} isDisabled={busy}>
+      <Button variant="primary" icon="plus" type="submit" why={why} isDisabled={busy}>
         {busy ? t`Adding…` : t`Add`}
       </Button>
       {/** Below the button, so that the button does not move when a field loses the focus. */}

@@ -5,7 +5,7 @@ import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { Input, Label, SearchField } from "react-aria-components";
 import { addShape, notBuildable, type ShapeKind } from "../../commands/scene";
-import { compared } from "../../formats";
+import { compareTexts } from "../../formats";
 import { words } from "../../program/naming";
 import type { ObjectTypeMeta } from "../../protocol/types";
 import { notify, useEditor } from "../../store/store";
@@ -41,7 +41,7 @@ export default function AddPanel() {
         .includes(wanted),
   );
   const groups = new Map<string, ObjectTypeMeta[]>();
-  for (const each of found.sort((a, b) => compared(shownName(a), shownName(b)))) {
+  for (const each of found.sort((a, b) => compareTexts(shownName(a), shownName(b)))) {
     const group = each.category ? words(each.category) : t`Other`;
     groups.set(group, [...(groups.get(group) ?? []), each]);
   }
@@ -63,7 +63,7 @@ export default function AddPanel() {
         <Input placeholder={t`Search devices`} />
       </SearchField>
       {[...groups]
-        .sort(([a], [b]) => compared(a, b))
+        .sort(([a], [b]) => compareTexts(a, b))
         .map(([group, members]) => (
           <section key={group} aria-label={group}>
             <h3 className="quiet small">{group}</h3>

@@ -5,9 +5,9 @@ import { Suspense, useState } from "react";
 import { duplicateObject, notBuildable, projectsUsing, removeObject, renameObject } from "../../commands/scene";
 import { storeViewState } from "../../commands/viewstate";
 import { heldBy } from "../../store/selectors";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { isPlaceable } from "../../viewmodel/devices";
-import { MoreOrLess, OnOff } from "../kit/fields";
+import { SliderField, SwitchField } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import { Confirm } from "../kit/lazyControls";
@@ -52,14 +52,14 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
         </Button>
       </div>
       {placeable && <Placing id={id} />}
-      <Seeing id={id} />
+      <Visibility id={id} />
       <Values key={id} id={id} />
       {needing && (
         <Confirm
           title={t`Remove ${object.name}?`}
-          yes={t`Remove`}
+          confirmLabel={t`Remove`}
           onClose={() => setNeeding(null)}
-          onYes={() => void removeObject(id, true)}
+          onConfirm={() => void removeObject(id, true)}
         >
           <p>{t`These projects lose the actions and points of this object when you save the scene:`}</p>
           <ul>
@@ -83,9 +83,9 @@ function Values({ id }: { id: string }) {
   if (!changing) return null;
   return (
     <>
-      <OnOff isSelected={shown} onChange={setShown}>
+      <SwitchField isSelected={shown} onChange={setShown}>
         {t`Trends of values`}
-      </OnOff>
+      </SwitchField>
       {shown && (
         <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
           <Trends id={id} />
@@ -96,37 +96,37 @@ function Values({ id }: { id: string }) {
 }
 
 /** Visibility for this user only. */
-function Seeing({ id }: { id: string }) {
+function Visibility({ id }: { id: string }) {
   const hidden = useEditor(
     (state) => Array.isArray(state.view.user.blocklist) && state.view.user.blocklist.includes(id),
   );
   const opacity = useEditor((state) =>
     Number((state.view.user.opacity as Record<string, unknown> | undefined)?.[id] ?? 1),
   );
-  const [now_, setNow] = useState<number | null>(null);
+  const [pending, setPending] = useState<number | null>(null);
   const put = (value: number) => {
-    const rest = { ...(now().view.user.opacity as Record<string, number> | undefined) };
+    const rest = { ...(getState().view.user.opacity as Record<string, number> | undefined) };
     if (value >= 1) delete rest[id];
     else rest[id] = value;
     storeViewState("user", { opacity: rest });
   };
   return (
     <>
-      <OnOff isSelected={hidden} onChange={(on) => setHidden(id, on)}>
+      <SwitchField isSelected={hidden} onChange={(on) => setHidden(id, on)}>
         {t`Hide`}
-      </OnOff>
+      </SwitchField>
       {!hidden && (
-        <MoreOrLess
+        <SliderField
           label={t`Transparency`}
-          value={1 - (now_ ?? opacity)}
+          value={1 - (pending ?? opacity)}
           least={0}
           most={0.95}
           step={0.05}
           words={(value) => `${Math.round(value * 100)} %`}
-          onChange={(value) => setNow(1 - value)}
+          onChange={(value) => setPending(1 - value)}
           onEnd={(value) => {
             put(1 - value);
-            setNow(null);
+            setPending(null);
           }}
         />
       )}

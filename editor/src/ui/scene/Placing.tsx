@@ -36,10 +36,10 @@ export function Placing({ id }: { id: string }) {
         </Button>
         {pose && (
           <>
-            <Button look="plain" why={why} onPress={turn}>
+            <Button variant="plain" why={why} onPress={turn}>
               {t`Turn by 90°`}
             </Button>
-            <Button look="plain" why={why} onPress={() => placeDevice(id, null)}>
+            <Button variant="plain" why={why} onPress={() => placeDevice(id, null)}>
               {t`Remove from the view`}
             </Button>
           </>

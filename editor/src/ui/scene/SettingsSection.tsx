@@ -49,7 +49,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
         <div className="actions">
           <Button onPress={() => keepForm(id, null)}>{t`Revert`}</Button>
           <Button
-            look="primary"
+            variant="primary"
             why={why}
             isDisabled={busy || lacking.length > 0}
             onPress={() =>

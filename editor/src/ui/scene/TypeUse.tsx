@@ -45,9 +45,9 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
       {sure && (
         <Confirm
           title={t`Delete ${type.display_name ?? type.type}?`}
-          yes={t`Delete`}
+          confirmLabel={t`Delete`}
           onClose={() => setSure(false)}
-          onYes={() => void ask(deleteType(type.type)).then((done) => done && onDeleted())}
+          onConfirm={() => void ask(deleteType(type.type)).then((done) => done && onDeleted())}
         >
           <p>{t`The type and its code are deleted. No scene uses it. This cannot be undone.`}</p>
         </Confirm>

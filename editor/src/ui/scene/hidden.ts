@@ -2,7 +2,7 @@
 
 import { storeViewState } from "../../commands/viewstate";
 import type { State } from "../../store/state";
-import { now } from "../../store/store";
+import { getState } from "../../store/store";
 
 const NOTHING: readonly string[] = [];
 
@@ -12,6 +12,6 @@ export function hiddenOf(state: State): readonly string[] {
 }
 
 export function setHidden(id: string, on: boolean): void {
-  const rest = hiddenOf(now()).filter((each) => each !== id);
+  const rest = hiddenOf(getState()).filter((each) => each !== id);
   storeViewState("user", { blocklist: on ? [...rest, id] : rest });
 }

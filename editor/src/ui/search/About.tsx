@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { version } from "../../../package.json";
 import { useEditor } from "../../store/store";
 import { Invitation } from "../join/Invitation";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { Button } from "../kit/kit";
 import { SaveDiagnosis } from "./SaveDiagnosis";
 import "./search.css";
@@ -22,7 +22,7 @@ const keys = (): readonly (readonly [string, string])[] => [
 export default function About({ onClose }: { onClose: () => void }) {
   const { server, user } = useEditor((state) => state.connection);
   return (
-    <Window title={t`About`} onClose={onClose}>
+    <ModalDialog title={t`About`} onClose={onClose}>
       <dl className="facts">
         <dt>{t`Editor`}</dt>
         <dd>ARCOR2-HW {version}</dd>
@@ -45,10 +45,10 @@ export default function About({ onClose }: { onClose: () => void }) {
         ))}
       </dl>
       <div className="actions">
-        <Button look="primary" onPress={onClose}>
+        <Button variant="primary" onPress={onClose}>
           {t`Close`}
         </Button>
       </div>
-    </Window>
+    </ModalDialog>
   );
 }

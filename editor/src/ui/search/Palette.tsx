@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useMemo, useState } from "react";
 import { Autocomplete, Input, Label, ListBox, ListBoxItem, SearchField } from "react-aria-components";
 import { notify, setUi, useEditor } from "../../store/store";
-import { Window } from "../kit/dialogs";
+import { ModalDialog } from "../kit/dialogs";
 import { entriesOf } from "./entries";
 import { found } from "./matches";
 import "./search.css";
@@ -30,7 +30,7 @@ export default function Palette({ onClose }: { onClose: () => void }) {
     entry.act();
   };
   return (
-    <Window title={t`Find a command or an object`} onClose={onClose}>
+    <ModalDialog title={t`Find a command or an object`} onClose={onClose}>
       <Autocomplete inputValue={search} onInputChange={setSearch}>
         <SearchField className="field" autoFocus aria-label={t`Find`}>
           <Label className="hidden-but-read">{t`Find`}</Label>
@@ -53,6 +53,6 @@ export default function Palette({ onClose }: { onClose: () => void }) {
           </ListBox>
         </div>
       </Autocomplete>
-    </Window>
+    </ModalDialog>
   );
 }

@@ -18,7 +18,7 @@ import { theSession } from "../../session/session";
 import { whyUnavailable } from "../../store/permissions";
 import { isClosed } from "../../store/selectors";
 import type { State } from "../../store/state";
-import { now, select, setUi } from "../../store/store";
+import { getState, select, setUi } from "../../store/store";
 import { kindName, selectionOf } from "../../viewmodel/names";
 import { allOf, thingsOf } from "../../viewmodel/things";
 import { openPoints } from "../io/address";
@@ -93,7 +93,7 @@ function ofWorkplace(state: State): Entry[] {
     ),
     entry("all", t`Show all in the view`, "", () => theEngine()?.focus()),
     ...(state.ui.selection
-      ? [entry("zoom", t`Zoom to selection`, "", () => theEngine()?.focus(now().ui.selection?.id))]
+      ? [entry("zoom", t`Zoom to selection`, "", () => theEngine()?.focus(getState().ui.selection?.id))]
       : []),
   ];
 }
@@ -106,7 +106,7 @@ function things(state: State): Entry[] {
     detail: kind === "object" ? detail : kindName(kind),
     why: "",
     act: () => {
-      select(selectionOf(now(), id));
+      select(selectionOf(getState(), id));
       setUi({ tool: "" });
       theEngine()?.focus(id);
     },

@@ -42,7 +42,9 @@ export function Settings() {
   const [pressed, setPressed] = useState(false);
   return (
     <Suspense
-      fallback={<Button look="plain" icon="settings" aria-label={t`Settings`} onPressStart={() => setPressed(true)} />}
+      fallback={
+        <Button variant="plain" icon="settings" aria-label={t`Settings`} onPressStart={() => setPressed(true)} />
+      }
     >
       <SettingsMenu defaultOpen={pressed} />
     </Suspense>

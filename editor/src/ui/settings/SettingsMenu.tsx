@@ -63,7 +63,7 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
       id: "tour",
       label: t`Guided tour`,
       icon: "play",
-      not: noTour ? t`Open a project first.` : "",
+      why: noTour ? t`Open a project first.` : "",
       act: () => {
         if (operates) location.hash = "#/operator";
         setUi({ tour: 0 });
@@ -72,8 +72,8 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
     { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },
     { id: "interlocks", label: t`Interlocks and zones`, icon: "lock", act: () => openOverlay("interlocks") },
     { id: "production", label: t`Recipes and units`, icon: "list", act: () => openOverlay("production") },
-    { id: "audit", label: t`Who did what`, icon: "people", not: noAudit, act: () => openOverlay("audit") },
-    { id: "persons", label: t`Persons`, icon: "people", not: noPersons, act: () => openOverlay("persons") },
+    { id: "audit", label: t`Audit trail`, icon: "people", why: noAudit, act: () => openOverlay("audit") },
+    { id: "persons", label: t`Persons`, icon: "people", why: noPersons, act: () => openOverlay("persons") },
     ...(shared ? [{ id: "pin", label: t`Change PIN`, icon: "lock" as const, act: () => openOverlay("pin") }] : []),
     { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
     ...(fleet

@@ -6,9 +6,9 @@ import { ListBox, ListBoxItem } from "react-aria-components";
 import { storeGeneralState } from "../../commands/viewstate";
 import { aimsAlways, chooseCandidate, listAimed } from "../../session/aiming";
 import type { State } from "../../store/state";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { kindName, nameOf, selectionOf } from "../../viewmodel/names";
-import { OnOff } from "../kit/fields";
+import { SwitchField } from "../kit/fields";
 import { Icon } from "../kit/icons";
 import { pick } from "../workplace/pick";
 import { ICONS } from "./ThingTree";
@@ -28,7 +28,7 @@ export function AtCrosshair() {
         renderEmptyState={() => <p className="quiet">{t`Nothing at the crosshair. Turn the view.`}</p>}
       >
         {({ id }) => {
-          const state = now();
+          const state = getState();
           const kind = selectionOf(state, id)?.kind ?? "object";
           return (
             <ListBoxItem
@@ -48,9 +48,9 @@ export function AtCrosshair() {
           );
         }}
       </ListBox>
-      <OnOff isSelected={always} onChange={(on) => storeGeneralState({ aiming: on || null })}>
+      <SwitchField isSelected={always} onChange={(on) => storeGeneralState({ aiming: on || null })}>
         {t`Keep the crosshair when this is closed`}
-      </OnOff>
+      </SwitchField>
     </>
   );
 }

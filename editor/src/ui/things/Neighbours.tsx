@@ -21,14 +21,14 @@ export default function Neighbours({ id }: { id: string }) {
   return (
     <span className="neighbours">
       <Button
-        look="plain"
+        variant="plain"
         icon="left"
         aria-label={t`Previous: ${rows.before?.name ?? ""}`}
         why={rows.before ? "" : alone}
         onPress={() => to(rows.before)}
       />
       <Button
-        look="plain"
+        variant="plain"
         icon="right"
         aria-label={t`Next: ${rows.after?.name ?? ""}`}
         why={rows.after ? "" : alone}

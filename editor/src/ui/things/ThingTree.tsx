@@ -5,7 +5,7 @@ import { Button, Collection, ListLayout, Tree, TreeItem, TreeItemContent, Virtua
 import { storeViewState } from "../../commands/viewstate";
 import { theEngine } from "../../session/engine";
 import { heldBy } from "../../store/selectors";
-import { now, select, setUi, useEditor } from "../../store/store";
+import { getState, select, setUi, useEditor } from "../../store/store";
 import type { Kind } from "../../store/ui";
 import { selectionOf } from "../../viewmodel/names";
 import { flat, type Row } from "../../viewmodel/things";
@@ -33,7 +33,7 @@ function foldedOf(stored: unknown): readonly string[] {
 
 /** Select an item of a list, and bring it into the view. */
 export function goTo(id: string): void {
-  select(selectionOf(now(), id));
+  select(selectionOf(getState(), id));
   setUi({ tool: "" });
   theEngine()?.focus(id);
 }
@@ -55,12 +55,12 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
     if (unfolded) return;
     const mine = parents.map((row) => row.id);
     // Forget collapsed items that no longer exist.
-    const rest = folded.filter((id) => !mine.includes(id) && selectionOf(now(), id) !== null);
+    const rest = folded.filter((id) => !mine.includes(id) && selectionOf(getState(), id) !== null);
     const next = [...rest, ...mine.filter((id) => !keys.has(id))];
     storeViewState("user", { collapsed: next.length > 0 ? next : null });
   };
   const item = (row: Row) => {
-    const holder = heldBy(now(), row.id);
+    const holder = heldBy(getState(), row.id);
     const detail = holder ? t`In use by ${holder}` : hidden.includes(row.id) ? t`hidden` : row.detail;
     return (
       <TreeItem
@@ -129,6 +129,6 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
 }
 
 /** Return the number of rows whose parents are all unfolded. */
-export function shownRows(rows: readonly Row[], open: ReadonlySet<string>): number {
+function shownRows(rows: readonly Row[], open: ReadonlySet<string>): number {
   return rows.reduce((sum, row) => sum + 1 + (open.has(row.id) ? shownRows(row.below, open) : 0), 0);
 }

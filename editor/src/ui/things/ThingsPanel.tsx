@@ -8,7 +8,7 @@ import { storeViewState } from "../../commands/viewstate";
 import { setUi, useEditor } from "../../store/store";
 import { allOf, counts, fitting, narrowed, type Row, thingsOf } from "../../viewmodel/things";
 import { GROUPS, type Group } from "../../viewmodel/visibility";
-import { OneOf } from "../kit/fields";
+import { ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { hiddenOf } from "../scene/hidden";
 import { AtCrosshair } from "./AtCrosshair";
@@ -27,16 +27,16 @@ const WORDS: Record<Group, MessageDescriptor> = {
 const HIDDEN = "hidden";
 
 export default function ThingsPanel() {
-  const [by, setBy] = useState<"list" | "cross">("list");
+  const [by, setBy] = useState<"list" | "crosshair">("list");
   return (
     <>
-      <OneOf
+      <ToggleGroup
         quiet
         label={t`Show`}
         value={by}
         choices={[
           ["list", t`All`],
-          ["cross", t`At the crosshair`],
+          ["crosshair", t`At the crosshair`],
         ]}
         onChange={setBy}
       />

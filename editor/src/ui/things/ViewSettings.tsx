@@ -7,7 +7,7 @@ import { storeGeneralState, storeViewState } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
 import { parentLines } from "../../viewmodel/items";
 import { fadesOthers, opacityOfAll } from "../../viewmodel/visibility";
-import { MoreOrLess, OnOff } from "../kit/fields";
+import { SliderField, SwitchField } from "../kit/fields";
 
 /** Parts of the view that users can hide, with the keys under which the server stores that. */
 const HIDEABLE = [
@@ -25,11 +25,11 @@ export function ViewSettings({ narrowed }: { narrowed: boolean }) {
   return (
     <section className="section" aria-label={t`In the view`}>
       <h3>{t`In the view`}</h3>
-      <OnOff isSelected={fades} onChange={(on) => storeViewState("user", { fade_others: on || null })}>
+      <SwitchField isSelected={fades} onChange={(on) => storeViewState("user", { fade_others: on || null })}>
         {t`Fade other kinds`}
-      </OnOff>
+      </SwitchField>
       {fades && !narrowed && <p className="quiet small">{t`Choose kinds above first.`}</p>}
-      <MoreOrLess
+      <SliderField
         label={t`Transparency of objects`}
         value={1 - (moved ?? opacity)}
         least={0}
@@ -43,17 +43,17 @@ export function ViewSettings({ narrowed }: { narrowed: boolean }) {
         }}
       />
       {HIDEABLE.map(([key, words]) => (
-        <OnOff
+        <SwitchField
           key={key}
           isSelected={view[key] !== true}
           onChange={(on) => storeViewState("user", { [key]: on ? null : true })}
         >
           {i18n._(words)}
-        </OnOff>
+        </SwitchField>
       ))}
-      <OnOff isSelected={lines} onChange={(on) => storeGeneralState({ parent_lines: on || null })}>
+      <SwitchField isSelected={lines} onChange={(on) => storeGeneralState({ parent_lines: on || null })}>
         {t`Lines from points to their parents`}
-      </OnOff>
+      </SwitchField>
     </section>
   );
 }

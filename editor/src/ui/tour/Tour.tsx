@@ -3,7 +3,7 @@
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { now, setUi, useEditor } from "../../store/store";
+import { getState, setUi, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { stepsOf } from "./steps";
 import "./tour.css";
@@ -11,11 +11,11 @@ import "./tour.css";
 export default function Tour() {
   const at = useEditor((state) => state.ui.tour) ?? 0;
   const steps = useEditor((state) => stepsOf(state.connection.role));
-  const [began, setBegan] = useState(now);
+  const [began, setBegan] = useState(getState);
   const done = useEditor((state) => steps[at]?.done?.(state, began) ?? false);
   const step = steps[at];
   const next = () => {
-    setBegan(now());
+    setBegan(getState());
     setUi({ tour: at + 1 < steps.length ? at + 1 : null });
   };
   useEffect(() => {
@@ -28,7 +28,7 @@ export default function Tour() {
         <strong>{`${at + 1}/${steps.length}`}</strong> {i18n._(step.text)}
       </p>
       <div className="row">
-        <Button look="plain" onPress={() => setUi({ tour: null })}>
+        <Button variant="plain" onPress={() => setUi({ tour: null })}>
           {t`End tour`}
         </Button>
         <Button onPress={next}>{step.done ? t`Skip step` : t`Next`}</Button>

@@ -7,7 +7,7 @@ import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import type { Selection } from "../../store/ui";
 
-export interface TourStep {
+interface TourStep {
   text: MessageDescriptor;
   /** Return whether it is done, compared with the state when the step began; without it the user continues. */
   done?: (state: State, began: State) => boolean;

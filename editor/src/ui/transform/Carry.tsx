@@ -1,10 +1,10 @@
 /** In AR: a button that makes the selected item follow the tablet while it is held. A separate chunk. */
 
 import { t } from "@lingui/core/macro";
-import type { Held } from "../../commands/holdToRun";
-import { moving } from "../../commands/move";
+import type { HoldToRunMotion } from "../../commands/holdToRun";
+import { beginMove } from "../../commands/move";
 import { theEngine } from "../../session/engine";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import type { Selection } from "../../store/ui";
 import { carried, same } from "../../transform/placing";
 import { targetOf } from "../../transform/target";
@@ -40,18 +40,18 @@ export default function Carry({ selection, turns, why }: CarryProps) {
 }
 
 /** Let an item follow the camera of the view until the end; then send it as one edit. */
-function carry(selection: Selection, turns: boolean): Held {
+function carry(selection: Selection, turns: boolean): HoldToRunMotion {
   const engine = theEngine();
-  const start = targetOf(now(), selection);
+  const start = targetOf(getState(), selection);
   if (!engine || !start) return { end: () => {}, over: Promise.resolve("") };
-  const one = moving(start);
+  const one = beginMove(start);
   const from = viewPose();
   let shown = from;
   const unwatch = engine.watch(() => {
     const view = viewPose();
     if (same(view, shown)) return;
     shown = view;
-    one.to(carried(start.pose, from, view, turns));
+    one.moveTo(carried(start.pose, from, view, turns));
   });
   return {
     end: () => {

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useId, useState } from "react";
-import { ANGLE_UNITS, amount, isAngle, LENGTH_UNITS, show, type Unit } from "../../transform/amounts";
+import { ANGLE_UNITS, amountText, isAngle, LENGTH_UNITS, parseAmount, type Unit } from "../../transform/amounts";
 import { Button } from "../kit/kit";
 import { PadKeys } from "../kit/PadKeys";
 
@@ -25,7 +25,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
   const id = useId();
   const change = by || onlyBy;
   const [text, setText] = useState("");
-  const next = text.trim() === "" ? null : amount(text, value, unit, change);
+  const next = text.trim() === "" ? null : parseAmount(text, value, unit, change);
   const wrong = text.trim() !== "" && next === null;
   const submit = (event: FormEvent) => {
     event.preventDefault();
@@ -38,7 +38,9 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
       <div className="pad-head">
         <label htmlFor={id}>{change ? t`${label} by` : t`${label} to`}</label>
         <output className="quiet small" aria-live="polite">
-          {wrong ? t`Enter a number.` : `${show(value, unit)} → ${next === null ? "…" : show(next, unit)} ${unit}`}
+          {wrong
+            ? t`Enter a number.`
+            : `${amountText(value, unit)} → ${next === null ? "…" : amountText(next, unit)} ${unit}`}
         </output>
       </div>
       <div className="pad-field">
@@ -48,7 +50,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
           inputMode="none"
           autoComplete="off"
           autoFocus
-          placeholder={change ? "0" : show(value, unit)}
+          placeholder={change ? "0" : amountText(value, unit)}
           value={text}
           aria-invalid={wrong}
           onChange={(event) => setText(event.target.value)}
@@ -84,7 +86,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
           </Button>
         )}
         <Button onPress={onClose}>{t`Cancel`}</Button>
-        <Button look="primary" type="submit" isDisabled={next === null}>
+        <Button variant="primary" type="submit" isDisabled={next === null}>
           {t`Set`}
         </Button>
       </div>

@@ -3,13 +3,13 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";
-import { moving, place, step } from "../../commands/move";
+import { beginMove, place, step } from "../../commands/move";
 import { storeGeneralState } from "../../commands/viewstate";
 import type { GizmoMode } from "../../engine/gizmo/handles";
 import { translated } from "../../i18n/choices";
 import type { ObjectModel, Pose } from "../../protocol/types";
 import type { State } from "../../store/state";
-import { notify, now, useEditor } from "../../store/store";
+import { getState, notify, useEditor } from "../../store/store";
 import type { Selection } from "../../store/ui";
 import {
   ANGLE_STEPS,
@@ -38,7 +38,7 @@ import { notMovable, notSizable, type Target, targetOf } from "../../transform/t
 import { type Snap, TOOL, type ToolSettings, toolSettings } from "../../transform/tool";
 import { relativeTo } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
-import { Amount, OneOf, Pick } from "../kit/fields";
+import { NumberField, SelectField, ToggleGroup } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import { NumberPad } from "./NumberPad";
@@ -54,7 +54,8 @@ const SNAPS: readonly (readonly [Snap, MessageDescriptor])[] = [
   ["surface", msg`surfaces`],
   ["point", msg`other objects`],
 ];
-const keep = (change: Partial<ToolSettings>) => storeGeneralState({ [TOOL]: { ...toolSettings(now()), ...change } });
+const keep = (change: Partial<ToolSettings>) =>
+  storeGeneralState({ [TOOL]: { ...toolSettings(getState()), ...change } });
 /** Choice of a custom step. */
 const FREE = "free";
 
@@ -69,7 +70,7 @@ function useTarget(selection: Selection): Target | null {
   useEditor((state) => state.doc);
   useEditor((state) => state.ui.draft);
   useEditor((state) => state.types.byName);
-  return targetOf(now(), selection);
+  return targetOf(getState(), selection);
 }
 
 function Placing({ selection, target }: { selection: Selection; target: Target }) {
@@ -82,7 +83,7 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
   const [before, setBefore] = useState<{ pose: Pose; model?: ObjectModel }>({ pose: target.pose, model: target.model });
   const mode = wanted === "size" && !target.model ? "move" : wanted;
   useGizmo(selection, mode);
-  const state = now();
+  const state = getState();
   const frame = toolFrame(state, target);
   const why = mode === "size" ? whySize : whyNot;
   const relative = settings.frame === "own" || settings.frame === "view";
@@ -91,11 +92,18 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
   if (target.turns) modes.push(["turn", t`Turn`]);
   if (target.model) modes.push(["size", t`Size`]);
   const changed = !same(before.pose, target.pose) || JSON.stringify(before.model) !== JSON.stringify(target.model);
-  const settle = (pose: Pose, model?: ObjectModel) => void place(targetOf(now(), selection) ?? target, pose, model);
+  const settle = (pose: Pose, model?: ObjectModel) =>
+    void place(targetOf(getState(), selection) ?? target, pose, model);
   return (
     <>
       {modes.length > 1 && (
-        <OneOf label={t`Change`} quiet value={mode} choices={modes} onChange={(next) => (setMode(next), setOpen(""))} />
+        <ToggleGroup
+          label={t`Change`}
+          quiet
+          value={mode}
+          choices={modes}
+          onChange={(next) => (setMode(next), setOpen(""))}
+        />
       )}
       {why && <p className="small quiet">{why}</p>}
       <div className="axis-rows">
@@ -120,14 +128,14 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
       <div className="tool-settings">
         <Steps settings={settings} turn={mode === "turn"} />
         {mode !== "size" && (
-          <Pick
+          <SelectField
             label={t`Frame`}
             value={settings.frame}
             choices={framesOf(state, target)}
             onChange={(value) => keep({ frame: value as FrameName })}
           />
         )}
-        <Pick
+        <SelectField
           label={t`Snap to`}
           value={settings.snap}
           choices={translated(SNAPS)}
@@ -157,7 +165,7 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
           {t`Paste`}
         </Button>
         {changed && (
-          <Button look="plain" onPress={() => setBefore({ pose: target.pose, model: target.model })}>
+          <Button variant="plain" onPress={() => setBefore({ pose: target.pose, model: target.model })}>
             {t`Set as start`}
           </Button>
         )}
@@ -202,7 +210,7 @@ function Coordinate({ axis, mode, target, settings, frame, relative, why, select
         open={open}
         onOpen={() => (why ? notify("info", why) : onOpen(!open))}
         onSteps={(steps) => {
-          const latest = targetOf(now(), selection);
+          const latest = targetOf(getState(), selection);
           if (latest) step(latest, by(latest.pose, steps * size));
         }}
       />
@@ -216,7 +224,7 @@ function Coordinate({ axis, mode, target, settings, frame, relative, why, select
           onUnit={(next) => keep(turn ? { angle: next as AngleUnit } : { length: next as LengthUnit })}
           onBy={(next) => keep({ by: next })}
           onDone={(next) => {
-            const latest = targetOf(now(), selection) ?? target;
+            const latest = targetOf(getState(), selection) ?? target;
             const pose = relative
               ? by(latest.pose, next)
               : turn
@@ -242,7 +250,7 @@ interface SizesProps {
 
 function Sizes({ model, target, settings, why, open, onOpen }: SizesProps) {
   const latest = (label: string) => {
-    const at = targetOf(now(), { kind: "object", id: target.id }) ?? target;
+    const at = targetOf(getState(), { kind: "object", id: target.id }) ?? target;
     return { at, measure: measures(at.model ?? model).find((each) => each.label === label) };
   };
   const put = (label: string, value: number) => {
@@ -262,8 +270,8 @@ function Sizes({ model, target, settings, why, open, onOpen }: SizesProps) {
         onSteps={(steps) => {
           const { at, measure } = latest(label);
           if (!measure) return;
-          const one = moving(at);
-          one.to(at.pose, measure.put(measure.value + steps * settings.lengthStep));
+          const one = beginMove(at);
+          one.moveTo(at.pose, measure.put(measure.value + steps * settings.lengthStep));
           one.settle();
         }}
       />
@@ -292,24 +300,24 @@ function Steps({ settings, turn }: { settings: ToolSettings; turn: boolean }) {
   const known = steps.find(([each]) => Math.abs(each - value) < 1e-12);
   const choices: [string, string][] = steps.map(([each]) => [String(each), stepWords(each, turn ? "angle" : "length")]);
   choices.push([FREE, known ? t`other…` : stepWords(value, turn ? "angle" : "length")]);
-  const worth = turn ? Math.PI / 180 : 0.001;
+  const factor = turn ? Math.PI / 180 : 0.001;
   return (
     <>
-      <Pick
+      <SelectField
         label={t`Step`}
         value={known && !free ? String(known[0]) : FREE}
         choices={choices}
         onChange={(next) => (setFree(next === FREE), next === FREE || put(Number(next)))}
       />
       {(free || !known) && (
-        <Amount
+        <NumberField
           label={t`Custom step`}
           unit={turn ? "°" : "mm"}
           digits={3}
-          value={value / worth}
+          value={value / factor}
           least={0.001}
           most={10_000}
-          onChange={(next) => put(next * worth)}
+          onChange={(next) => put(next * factor)}
         />
       )}
     </>

@@ -5,7 +5,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type KeyboardEvent, type PointerEvent, useEffect, useRef } from "react";
-import { isAngle, show, stepWords, type Unit } from "../../transform/amounts";
+import { amountText, isAngle, stepWords, type Unit } from "../../transform/amounts";
 import { Button } from "../kit/kit";
 
 interface RowProps {
@@ -29,6 +29,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
   const turn = useRef(onSteps);
   turn.current = onSteps;
   const words = stepWords(step, isAngle(unit) ? "angle" : "length");
+  const amount = amountText(value, unit);
 
   // React's wheel listeners are passive, so the panel would scroll too.
   useEffect(() => {
@@ -70,7 +71,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
         className="axis-wheel"
         aria-expanded={open}
         aria-disabled={why !== "" || undefined}
-        aria-label={t`${label} ${show(value, unit)} ${unit}. Press to enter a value; arrow keys change it by ${words}.`}
+        aria-label={t`${label} ${amount} ${unit}. Press to enter a value; arrow keys change it by ${words}.`}
         onKeyDown={key}
         onPointerDown={(event) => {
           if (why) return;
@@ -86,7 +87,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
           rolled.current = false;
         }}
       >
-        {show(value, unit)} <span className="quiet">{unit}</span>
+        {amount} <span className="quiet">{unit}</span>
       </button>
       <Button className="axis-step" aria-label={t`Increase ${label} by ${words}`} why={why} onPress={() => onSteps(1)}>
         +

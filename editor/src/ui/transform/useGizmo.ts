@@ -1,7 +1,7 @@
 /** Put the gizmo at the selected item, and apply its drags. */
 
 import { useEffect } from "react";
-import { type Moving, moving } from "../../commands/move";
+import { beginMove, type ItemMove } from "../../commands/move";
 import { chosenRobot } from "../../commands/robot";
 import type { Engine } from "../../engine/engine";
 import type { Drag } from "../../engine/gizmo/gizmo";
@@ -10,9 +10,9 @@ import { worldPose } from "../../engine/poses";
 import type { Pose, Position } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
 import type { State } from "../../store/state";
-import { now, store } from "../../store/store";
+import { getState, store } from "../../store/store";
 import type { Selection } from "../../store/ui";
-import { show } from "../../transform/amounts";
+import { amountText } from "../../transform/amounts";
 import { type Axis, minus, moved, onGrid, plusOf, rounded, turnedAbout } from "../../transform/placing";
 import { halfOf, lifted, pulled } from "../../transform/sizes";
 import { frameOf, notMovable, notSizable, type Target, targetOf } from "../../transform/target";
@@ -49,7 +49,7 @@ export function useGizmo(selection: Selection, mode: GizmoMode): void {
         if (engine) engine.gizmo.onDrag = (drag) => follow.drag(engine, drag);
       }
       if (!engine || engine.gizmo.isDragging) return;
-      const state = now();
+      const state = getState();
       const target = targetOf(state, mine);
       const possible =
         target &&
@@ -82,14 +82,14 @@ export function useGizmo(selection: Selection, mode: GizmoMode): void {
 /** Apply one drag after the other. */
 class Follower {
   private start: Target | null = null;
-  private one: Moving | null = null;
+  private one: ItemMove | null = null;
 
   constructor(private readonly selection: Selection) {}
 
   drag(engine: Engine, drag: Drag): void {
     if (drag.phase === "start") {
-      this.start = targetOf(now(), this.selection);
-      this.one = this.start && moving(this.start);
+      this.start = targetOf(getState(), this.selection);
+      this.one = this.start && beginMove(this.start);
       return;
     }
     const { start, one } = this;
@@ -103,50 +103,50 @@ class Follower {
     }
   }
 
-  private move(engine: Engine, drag: Drag, start: Target, one: Moving): void {
+  private move(engine: Engine, drag: Drag, start: Target, one: ItemMove): void {
     if (one.failed) return; // refused: the user has been notified
-    const state = now();
+    const state = getState();
     const { snap, lengthStep, angleStep, length, angle } = toolSettings(state);
     const { handle } = drag;
     const grid = snap === "grid";
     const note = (text: string) => engine.note(start.id, text);
     const frame = toolFrame(state, start);
-    switch (handle.do) {
+    switch (handle.kind) {
       case "axis": {
         const by = rounded(drag.length, grid ? lengthStep : FINE);
-        one.to({ ...start.pose, position: plusOf(start.pose.position, drag.axis, by) });
-        return note(`${handle.axis.toUpperCase()} ${signed(show(by, length))} ${length}`);
+        one.moveTo({ ...start.pose, position: plusOf(start.pose.position, drag.axis, by) });
+        return note(`${handle.axis.toUpperCase()} ${signed(amountText(by, length))} ${length}`);
       }
       case "plane": {
         const free = { ...start.pose, position: plusOf(start.pose.position, drag.translation, 1) };
         const along = (["x", "y", "z"] as Axis[]).filter((each) => each !== handle.axis);
         const position = onGrid(free.position, frame, grid ? lengthStep : FINE, along);
-        one.to({ ...free, position });
+        one.moveTo({ ...free, position });
         return note(translationText(minus(position, start.pose.position), length));
       }
       case "free": {
         const pose = this.freely(engine, drag, start);
-        one.to(pose);
+        one.moveTo(pose);
         return note(translationText(minus(pose.position, start.pose.position), length));
       }
       case "ring": {
         const by = rounded(drag.angle, grid ? angleStep : FINE_TURN);
-        one.to(turnedAbout(start.pose, drag.axis, by));
-        return note(`${signed(show(by, angle))}${angle === "°" ? "°" : " rad"}`);
+        one.moveTo(turnedAbout(start.pose, drag.axis, by));
+        return note(`${signed(amountText(by, angle))}${angle === "°" ? "°" : " rad"}`);
       }
       case "face": {
         if (!start.model) return;
         const { model, shift } = pulled(start.model, handle.axis, rounded(drag.length, grid ? lengthStep : FINE));
-        one.to(moved(start.pose, start.pose, handle.axis, shift * handle.sign), model);
+        one.moveTo(moved(start.pose, start.pose, handle.axis, shift * handle.sign), model);
         const half = halfOf(model);
-        return note(`${show(half[handle.axis] * 2, length)} ${length}`);
+        return note(`${amountText(half[handle.axis] * 2, length)} ${length}`);
       }
     }
   }
 
   /** Return the pose of an item that follows the pointer. */
   private freely(engine: Engine, drag: Drag, start: Target): Pose {
-    const state = now();
+    const state = getState();
     const { snap, lengthStep } = toolSettings(state);
     const free = { ...start.pose, position: plusOf(start.pose.position, drag.translation, 1) };
     const doc = state.doc;
@@ -180,6 +180,6 @@ function signed(text: string): string {
 }
 
 function translationText(by: Position, unit: ReturnType<typeof toolSettings>["length"]): string {
-  const part = (axis: "x" | "y" | "z") => `${axis.toUpperCase()} ${signed(show(rounded(by[axis], FINE), unit))}`;
+  const part = (axis: "x" | "y" | "z") => `${axis.toUpperCase()} ${signed(amountText(rounded(by[axis], FINE), unit))}`;
   return `${part("x")}  ${part("y")}  ${part("z")} ${unit}`;
 }

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useEffect, useRef } from "react";
 import UPlot from "uplot";
-import { clock, compared, decimal } from "../../formats";
+import { clock, compareTexts, decimal } from "../../formats";
 import { useTheme } from "../settings/Settings";
 import { type Series, SPAN } from "./history";
 import "uplot/dist/uPlot.min.css";
@@ -77,7 +77,7 @@ export function Chart({ times, series }: { times: number[]; series: Series[] }) 
   useEffect(() => plot.current?.setData(data));
   const names = series
     .map((each) => each.name)
-    .sort(compared)
+    .sort(compareTexts)
     .join(", ");
   return <div ref={box} className="trend-chart" role="img" aria-label={t`${names}, last ${SPAN / 60} minutes`} />;
 }

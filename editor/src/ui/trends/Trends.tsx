@@ -9,7 +9,7 @@ import type { Observation } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { theEngine } from "../../session/engine";
 import { isLive } from "../../store/selectors";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { STALE, telemetry } from "../../store/telemetry";
 import { RefusedText } from "../points/Refusal";
 import { useVisible } from "../useVisible";
@@ -80,7 +80,7 @@ function Observations({ id }: { id: string }) {
   const seen = useVisible();
   useEffect(() => {
     if (!live || !seen) return;
-    const { runtime } = now();
+    const { runtime } = getState();
     runtime.takeObservations = (data) => {
       if (data.object_id !== id) return;
       setFailed("");

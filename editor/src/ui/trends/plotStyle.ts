@@ -2,7 +2,7 @@
 
 import type UPlot from "uplot";
 
-export interface PlotStyle {
+interface PlotStyle {
   /** Return the value of a colour, such as `--line`. */
   colour: (name: string) => string;
   axis: UPlot.Axis;

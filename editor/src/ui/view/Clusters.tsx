@@ -6,7 +6,7 @@ import { Vector3 } from "three";
 import { boxOf, type Cluster, clustersOf, type Spot } from "../../engine/clusters";
 import type { Engine } from "../../engine/engine";
 import { boundsOf, type Thing } from "../../engine/thing";
-import { taken } from "../aim/OffScreen";
+import { controlAreas } from "../aim/OffScreen";
 
 /** Names in the label for screen readers. */
 const MAX_NAMES = 6;
@@ -20,7 +20,7 @@ export function Clusters({ engine }: { engine: Engine }) {
     engine.arrangeBy((labels) => {
       const spots = spotsOf(engine, radii);
       const view = engine.view.element.getBoundingClientRect();
-      const controls = taken(view);
+      const controls = controlAreas(view);
       const found = clustersOf(spots, view.width, view.height, controls);
       const next = JSON.stringify(found);
       if (next !== shown) setClusters(found);

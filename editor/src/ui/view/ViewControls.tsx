@@ -9,7 +9,7 @@ import type { ViewMode, ViewName, Viewpoint } from "../../engine/camera";
 import type { Engine } from "../../engine/engine";
 import { calledBy } from "../../program/operands";
 import { aimsAlways } from "../../session/aiming";
-import { now, useEditor } from "../../store/store";
+import { getState, useEditor } from "../../store/store";
 import { viewersOf } from "../../viewmodel/viewers";
 import { Aim } from "../aim/Aim";
 import { OffScreen } from "../aim/OffScreen";
@@ -71,7 +71,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
     setMode(next);
   };
   const look = (from: ViewName) => {
-    engine.view.look(from);
+    engine.view.lookFrom(from);
     setMode("orbit");
   };
   const choices: Choice[] = [
@@ -114,7 +114,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
         <div className="view-controls">
           <Button icon="zoom" aria-label={t`Show all`} onPress={() => engine.focus()} />
           <Cube engine={engine} onLook={look} />
-          <More label={t`Views`} icon="eye" look="" choices={choices} />
+          <More label={t`Views`} icon="eye" variant="" choices={choices} />
           <Button icon="camera" onPress={() => setStarting(true)}>
             {t`AR`}
           </Button>
@@ -138,11 +138,11 @@ export default function ViewControls({ engine }: { engine: Engine }) {
       {naming && (
         <AskName
           title={t`Save view`}
-          yes={t`Keep`}
+          confirmLabel={t`Save`}
           initial={t`View ${bookmarks.length + 1}`}
           taken={bookmarks.map((each) => each.name)}
           onClose={() => setNaming(false)}
-          onYes={(name) => storeViewState("user", { [KEY]: [...bookmarks, { name, ...engine.view.viewpoint }] })}
+          onConfirm={(name) => storeViewState("user", { [KEY]: [...bookmarks, { name, ...engine.view.viewpoint }] })}
         />
       )}
     </>
@@ -150,7 +150,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
 }
 
 function switchCrosshair(): void {
-  storeGeneralState({ aiming: !aimsAlways(now()) || null });
+  storeGeneralState({ aiming: !aimsAlways(getState()) || null });
 }
 
 /** X shows or hides the crosshair. */

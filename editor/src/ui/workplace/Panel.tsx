@@ -34,7 +34,7 @@ export default function Panel() {
             <Neighbours id={selection.id} />
           </Suspense>
         )}
-        <Button look="plain" icon="close" aria-label={t`Close the panel`} onPress={close} />
+        <Button variant="plain" icon="close" aria-label={t`Close the panel`} onPress={close} />
       </header>
       <div className="panel-body">
         {/** A boundary for each tool: the state of the last tool must not stay while the next one is loading. */}

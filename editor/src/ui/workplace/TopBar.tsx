@@ -32,7 +32,7 @@ export function TopBar() {
   return (
     <header className="bar topbar">
       <Button
-        look="plain"
+        variant="plain"
         icon="home"
         aria-label={t`Close`}
         onPress={() => {
@@ -61,14 +61,14 @@ export function TopBar() {
         <span>{t`Save`}</span>
       </Button>
       <Button
-        look="plain"
+        variant="plain"
         icon="undo"
         aria-label={history?.undo ? t`Undo ${translate(history.undo)}` : t`Undo`}
         why={cannotUndo || (history?.undo ? "" : t`There is nothing to undo.`)}
         onPress={() => void documents.undo()}
       />
       <Button
-        look="plain"
+        variant="plain"
         icon="redo"
         aria-label={history?.redo ? t`Redo ${translate(history.redo)}` : t`Redo`}
         why={cannotUndo || (history?.redo ? "" : t`There is nothing to redo.`)}
@@ -80,9 +80,9 @@ export function TopBar() {
       {asking && (
         <Confirm
           title={t`Close without saving?`}
-          yes={t`Discard changes`}
+          confirmLabel={t`Discard changes`}
           onClose={() => setAsking(false)}
-          onYes={() => void documents.close(true)}
+          onConfirm={() => void documents.close(true)}
         >
           <p>{t`All unsaved changes are lost, including those of other users.`}</p>
         </Confirm>

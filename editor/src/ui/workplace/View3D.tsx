@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { Suspense } from "react";
 import type { Engine } from "../../engine/engine";
 import { persistently } from "../../persistently";
-import { tapTaken } from "../../session/taps";
+import { handleTap } from "../../session/taps";
 import { store } from "../../store/store";
 import { Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
@@ -16,7 +16,7 @@ const ViewControls = lazyComponent(() => import("../view/ViewControls"));
 const USE = {
   begin: (engine: Engine, canvas: HTMLCanvasElement) => {
     engine.onTap = (hits, floor) => {
-      if (!tapTaken(hits, floor)) pick(hits.map((hit) => hit.id));
+      if (!handleTap(hits, floor)) pick(hits.map((hit) => hit.id));
     };
     let ended = false;
     let noDrags = () => {};

@@ -3,7 +3,7 @@
 import { notEditable, placePuck, showPuck } from "../../commands/program";
 import type { Engine } from "../../engine/engine";
 import { placeKey } from "../../program/steps";
-import { now } from "../../store/store";
+import { getState } from "../../store/store";
 
 /** Distance after which a touch is a drag, pixels. */
 const BEGINS = 6;
@@ -24,13 +24,13 @@ export function dragPucks(engine: Engine, canvas: HTMLCanvasElement): () => void
     return [event.clientX - box.left, event.clientY - box.top] as const;
   };
   const down = (event: PointerEvent) => {
-    const { selection } = now().ui;
-    if (held || !event.isPrimary || event.button !== 0 || !selection || now().ui.connecting) return;
+    const { selection } = getState().ui;
+    if (held || !event.isPrimary || event.button !== 0 || !selection || getState().ui.connecting) return;
     if (selection.kind !== "action" && selection.kind !== "terminal") return;
     const [x, y] = place(event);
     if (
       engine.pick(x, y, event.pointerType === "mouse" ? 4 : 14)[0]?.id !== selection.id ||
-      notEditable(now(), "PreviewMove")
+      notEditable(getState(), "PreviewMove")
     )
       return;
     const level = engine.item(selection.id)?.pose.position.z ?? 0;
@@ -41,7 +41,7 @@ export function dragPucks(engine: Engine, canvas: HTMLCanvasElement): () => void
       y,
       moved: false,
       pointer: event.pointerId,
-      before: now().view.shared[placeKey(now().doc, selection.id)],
+      before: getState().view.shared[placeKey(getState().doc, selection.id)],
     };
     engine.view.enable(false);
     canvas.setPointerCapture(event.pointerId);

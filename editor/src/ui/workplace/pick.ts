@@ -1,11 +1,11 @@
 /** Handle a pick in the view: end a connection in progress, or select. */
 
-import { now, select, setUi } from "../../store/store";
+import { getState, select, setUi } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 
 /** `ids` are the candidates, most likely first. Picking the selected item again selects the one behind it. */
 export function pick(ids: readonly string[]): void {
-  const state = now();
+  const state = getState();
   const found = ids.map((id) => selectionOf(state, id)).filter((each) => each !== null);
   if (state.ui.connecting) {
     const target = found.find(({ kind }) => kind === "action" || kind === "terminal");

@@ -7,13 +7,13 @@ import type { Item } from "../../engine/items";
 import { persistently } from "../../persistently";
 import { readShown } from "../../session/assets";
 import { setEngine } from "../../session/engine";
-import { notify, now, store, useEditor } from "../../store/store";
+import { getState, notify, store, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
 import { useTheme } from "../settings/Settings";
 
 /** The items that a view shows, and the function that starts to use its engine and returns one that stops it. */
-export interface Use {
+interface EngineUse {
   shown?: (item: Item) => boolean;
   begin: (engine: Engine, canvas: HTMLCanvasElement) => () => void;
 }
@@ -29,7 +29,7 @@ interface UsedEngine {
 }
 
 /** `use` must be a constant. */
-export function useEngine({ shown, begin }: Use): UsedEngine {
+export function useEngine({ shown, begin }: EngineUse): UsedEngine {
   const canvas = useRef<HTMLCanvasElement>(null);
   const labels = useRef<HTMLDivElement>(null);
   const [engine, setMine] = useState<Engine | null>(null);
@@ -64,7 +64,7 @@ export function useEngine({ shown, begin }: Use): UsedEngine {
         dark: themeAtStart.current === "dark",
       });
       made = view;
-      const show = (state = now()) => {
+      const show = (state = getState()) => {
         const items = maker.items(state);
         view.show(shown ? items.filter(shown) : items);
       };

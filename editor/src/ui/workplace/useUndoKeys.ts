@@ -4,10 +4,10 @@ import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import * as documents from "../../commands/documents";
 import { whyUnavailable } from "../../store/permissions";
-import { notify, now } from "../../store/store";
+import { getState, notify } from "../../store/store";
 
 /** Time after a step within which the event about the next one may still arrive, ms. */
-const NEWS = 1000;
+const EVENT_DELAY = 1000;
 
 export function useUndoKeys(): void {
   useEffect(() => {
@@ -16,11 +16,11 @@ export function useUndoKeys(): void {
       const wanted = undoOrRedo(event);
       if (!wanted || event.repeat || isWriting(event.target) || document.querySelector(".overlay")) return;
       event.preventDefault();
-      const state = now();
+      const state = getState();
       const step = state.history?.[wanted];
       const why =
         whyUnavailable(state, wanted === "undo" ? "Undo" : "Redo") ||
-        (step || event.timeStamp - last < NEWS
+        (step || event.timeStamp - last < EVENT_DELAY
           ? ""
           : wanted === "undo"
             ? t`There is nothing to undo.`
@@ -34,7 +34,7 @@ export function useUndoKeys(): void {
   }, []);
 }
 
-export function undoOrRedo({
+function undoOrRedo({
   key,
   ctrlKey,
   metaKey,
