@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
 from arcor2_hw.data.recipes import RecipeState, UsedRecipe
 from arcor2_hw.data.units import UnitState
-from arcor2_server.fleet.columns import COUNT_ALL, INDEX_ALL, PUT, columns_of
+from arcor2_server.fleet.columns import COUNT_ALL, INDEX_ALL, PUT_RESULT, columns_of
 from arcor2_server.fleet.file import FILE, MAX_RESULTS, FleetFile
 from arcor2_server.fleet.reports import FleetReports, Period
 from arcor2_server.fleet.summaries import Columns
@@ -46,7 +46,7 @@ def fill(path: Path, units: int = MAX_RESULTS - ALARMS, alarms: int = ALARMS) ->
         connection.execute("begin")
         for name, _ in triggers:
             connection.execute(f"drop trigger {name}")
-        connection.executemany(PUT, _rows(units, alarms))
+        connection.executemany(PUT_RESULT, _rows(units, alarms))
         for statement in (COUNT_ALL, INDEX_ALL, *(sql for _, sql in triggers)):
             connection.execute(statement)
         connection.execute("commit")

@@ -13,7 +13,7 @@ from arcor2_hw.data.base import now
 from arcor2_hw.data.units import UnitState
 from arcor2_hw.messages import Message
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
-from arcor2_server.fleet.summaries import of_alarm, of_unit
+from arcor2_server.fleet.summaries import alarm_columns, unit_columns
 from tests.editor.screen import FONTS, Screen, screen_of
 from tests.ports import free_port
 from tests.server.core.serving import running
@@ -36,11 +36,11 @@ def store_results(folder: Path) -> None:
     bad = replace(bad, steps=[replace(bad.steps[0], name="weld", error=error.text, **error.translation())])
     czech = {"cs": {error.key: "Žádný oblouk při {current}."}}
     alarm = AlarmRecord(3, "d-1", "no_part", Priority.HIGH, AlarmCategory.DEVICE, "No part.", now(), 3)
-    columns = of_alarm(alarm, {"cs": {"No part.": "Chybí díl."}}, 0)
+    columns = alarm_columns(alarm, {"cs": {"No part.": "Chybí díl."}}, 0)
     document = msgspec.json.encode(alarm)
     results = [
         received(good),
-        received(bad)._replace(columns=of_unit(bad, czech, 0)),
+        received(bad)._replace(columns=unit_columns(bad, czech, 0)),
         ReceivedResult("oven", "b" * 32, "alarm", 3, now(), 1, document, columns),
     ]
     file.put_results(results)

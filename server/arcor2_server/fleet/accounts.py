@@ -1,7 +1,7 @@
 """Who may connect to the broker of the fleet, and the broker's configuration. It needs the extra `nodes`.
 
-Cells, brokers of sites, and the server of the page on another computer are members of the account, as nodes are of that
-of a server.
+Cells, brokers of sites, and the server of the page on another computer are members of the fleet's account, as nodes are
+members of a server's account.
 """
 
 from pathlib import Path
@@ -32,7 +32,7 @@ _CREDENTIALS: Final = """-----BEGIN NATS USER JWT-----
 """Content of a file of credentials, as nats-server reads it."""
 _ANSWERS: Final = "_INBOX.>"
 """Subjects of answers to the server of the page, which no cell may publish."""
-SERVER: Final = Rights(
+SERVER_RIGHTS: Final = Rights(
     [f"$JS.{api}.{what}" for api in ("API", "*.API") for what in ("CONSUMER.>", "STREAM.CREATE.>", "STREAM.INFO.>")]
     + ["$JS.ACK.>"],
     [STATES, _ANSWERS],
@@ -47,7 +47,7 @@ def member_rights(name: str, kind: MemberKind) -> Rights:
     of a stream can name subjects of other cells. A site may publish states of any cell, and is asked for its results.
     """
     if kind is MemberKind.PAGE:
-        return SERVER
+        return SERVER_RIGHTS
     if kind is MemberKind.SITE:
         return Rights([STATES, _ANSWERS], [f"$JS.{name}.API.>", f"$JS.ACK.{name}.>"], leaf=True)
     own = f"{PREFIX}.{name}"
@@ -56,7 +56,7 @@ def member_rights(name: str, kind: MemberKind) -> Rights:
     )
 
 
-FLEET: Final = Members("fleet", member_rights, SERVER)
+FLEET: Final = Members("fleet", member_rights, SERVER_RIGHTS)
 
 
 def fleet_accounts(settings: ServerSettings) -> Accounts:
@@ -97,7 +97,7 @@ def set_up(
     Raises:
         InvalidData: an address or the domain is invalid, or an address is without TLS on another computer.
         Conflict: the broker of a site has another domain than its name.
-        StorageError, NotFound: as of `Accounts.set_up`.
+        StorageError, NotFound: see `Accounts.set_up`.
     """
     check_name(domain)
     if sites:

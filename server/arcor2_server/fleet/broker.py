@@ -33,7 +33,7 @@ async def keep_connected(
 ) -> None:
     """Connect to the broker and use the connection; connect again after it was lost, until this is cancelled.
 
-    Losing the connection and having it again is logged once each, a missing broker once.
+    Each loss of the connection and each new connection is logged once, failed attempts only the first time.
 
     Args:
         credentials: returns address and credentials of the broker, before each attempt. They may be paired again.
@@ -118,7 +118,7 @@ async def _connect(
                 **credentials.options(),
             )
     except BaseException:
-        await _close(client)  # also a refused one has a socket
+        await _close(client)  # the socket of a refused connection is open, too
         raise
     connected = True
     return client

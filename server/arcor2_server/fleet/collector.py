@@ -24,7 +24,7 @@ from arcor2_server.fleet.broker import keep_connected
 from arcor2_server.fleet.file import FleetFile, FleetResult, ReceivedResult
 from arcor2_server.fleet.registry import MAX_PER_NAME, Registry
 from arcor2_server.fleet.reports import FleetReports
-from arcor2_server.fleet.summaries import of_alarm, of_unit
+from arcor2_server.fleet.summaries import alarm_columns, unit_columns
 from arcor2_server.nodes.confirmation import confirm_sent
 from arcor2_server.nodes.credentials import Credentials
 
@@ -94,7 +94,7 @@ class Collector:
         """End the connection, and store the cells."""
         await self._background.cancel()
         with contextlib.suppress(StorageError):
-            await self._in_file(lambda: self._file.put_cells(list(self.registry.stored())))
+            await self._in_writer(lambda: self._file.put_cells(list(self.registry.stored())))
         for executor in (self._reader, self._writer):
             executor.shutdown()
         self._reports.close()
@@ -104,17 +104,17 @@ class Collector:
         """Forget a cell without a signal. Raise NotFound or Conflict as the registry does, or StorageError."""
         name, identity = self.registry.remove(card_id)
         self._notify()
-        await self._in_file(lambda: self._file.remove_cell(name, identity))
+        await self._in_writer(lambda: self._file.remove_cell(name, identity))
 
     async def results(self, cell: str, kind: str, before: int, limit: int) -> list[FleetResult]:
         """Return stored results, newest first, as FleetFile does."""
-        return await self._in_file(lambda: self._file.results(cell, kind, before, limit))
+        return await self._in_writer(lambda: self._file.results(cell, kind, before, limit))
 
     async def report(self, work: Callable[[FleetReports], T]) -> T:
         """Return the result of a query, which does not delay the storing of results. Raise what the query raises."""
         return await asyncio.get_running_loop().run_in_executor(self._reader, work, self._reports)
 
-    async def _in_file(self, work: Callable[[], T]) -> T:
+    async def _in_writer(self, work: Callable[[], T]) -> T:
         return await asyncio.get_running_loop().run_in_executor(self._writer, work)
 
     def _notify(self) -> None:
@@ -134,7 +134,7 @@ class Collector:
             await asyncio.sleep(SAVE_PERIOD)
             cells = list(self.registry.stored())
             try:
-                await self._in_file(lambda cells=cells: self._file.put_cells(cells))  # type: ignore[misc]
+                await self._in_writer(lambda cells=cells: self._file.put_cells(cells))  # type: ignore[misc]
             except StorageError as error:
                 log.error("cells not stored", reason=str(error))
 
@@ -144,7 +144,7 @@ class Collector:
         await client.subscribe(r.STATES, cb=self._state_arrived)
         await confirm_sent(client)
         self.connected = True
-        self._renew()
+        self._notify_connection()
         await asyncio.Event().wait()
 
     def _lost(self) -> None:
@@ -153,9 +153,9 @@ class Collector:
             task.cancel()
         self._sources.clear()
         self.registry.lose_all()
-        self._renew()
+        self._notify_connection()
 
-    def _renew(self) -> None:
+    def _notify_connection(self) -> None:
         """Let the page show the connection to the broker."""
         self._notify()
         self.changed.set()
@@ -227,7 +227,7 @@ class Collector:
                 self._report(message.subject, "result of a cell refused", error)
                 await message.term()
         if received:
-            await self._in_file(lambda: self._file.put_results(received))
+            await self._in_writer(lambda: self._file.put_results(received))
         for message in stored:
             await message.ack()
 
@@ -255,10 +255,10 @@ def _received(name: str, message: Msg) -> ReceivedResult:
     received = message.metadata.timestamp.timestamp()
     if isinstance(result, r.UnitResult):
         kind, since = "unit", result.record.entered
-        columns = of_unit(result.record, result.translations, int(received))
+        columns = unit_columns(result.record, result.translations, int(received))
     else:
         kind, since = "alarm", result.record.raised
-        columns = of_alarm(result.record, result.translations, int(received))
+        columns = alarm_columns(result.record, result.translations, int(received))
     document = msgspec.json.encode(result.record)
     stamp = int(received * 1e6)
     return ReceivedResult(name, result.identity, kind, result.record.number, since, stamp, document, columns)

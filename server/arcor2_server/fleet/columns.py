@@ -7,7 +7,7 @@ import msgspec
 
 from arcor2_hw.data.alarms import AlarmRecord
 from arcor2_hw.data.units import UnitRecord
-from arcor2_server.fleet.summaries import Columns, of_alarm, of_unit
+from arcor2_server.fleet.summaries import Columns, alarm_columns, unit_columns
 
 SLOT: Final = 900
 """Time for which units are counted together, s. All time zones differ by a multiple of it."""
@@ -24,7 +24,7 @@ _COLUMNS: Final = {
 """The fields of `Columns`."""
 _FIELDS: Final = ("cell", "identity", "kind", "number", "since", "stamp", "document", *_COLUMNS)
 _REPLACED: Final = ("document", "stamp", *_COLUMNS)
-PUT: Final = (
+PUT_RESULT: Final = (
     f"insert into result ({', '.join(_FIELDS)}) values ({', '.join('?' * len(_FIELDS))}) "  # noqa: S608 (names from above)
     "on conflict (identity, kind, number, since) do update set "
     f"{', '.join(f'{name} = excluded.{name}' for name in _REPLACED)} where excluded.stamp > stamp"
@@ -33,7 +33,7 @@ PUT: Final = (
 _BATCH: Final = 10_000
 
 
-def _counted(row: str, sign: str) -> str:
+def _count_statement(row: str, sign: str) -> str:
     """Return a statement of a trigger that adds a row to the counts (sign +), or subtracts it (-)."""
     parts = ("good", "bad", "rejected")
     values = ", ".join(f"{sign}({row}.state = '{part}')" for part in parts)
@@ -53,17 +53,18 @@ _REPORTS: Final = (
     "create index bad_unit_at on result (at, id, cell) where kind = 'unit' and state in ('bad', 'rejected')",
     "create index bad_unit_of_cell on result (cell, at, id) where kind = 'unit' and state in ('bad', 'rejected')",
     "create index alarm_at on result (at, id, cell, label, times, until) where kind = 'alarm'",
-    f"create trigger unit_added after insert on result when new.kind = 'unit' begin {_counted('new', '+')} end",
-    f"create trigger unit_removed after delete on result when old.kind = 'unit' begin {_counted('old', '-')} end",
+    f"create trigger unit_added after insert on result when new.kind = 'unit' begin {_count_statement('new', '+')} end",
+    "create trigger unit_removed after delete on result when old.kind = 'unit' "
+    f"begin {_count_statement('old', '-')} end",
     "create trigger unit_changed after update of at, state, program, product on result when new.kind = 'unit' "
-    f"begin {_counted('old', '-')} {_counted('new', '+')} end",
+    f"begin {_count_statement('old', '-')} {_count_statement('new', '+')} end",
 )
 COUNT_ALL: Final = (
     f"insert into unit_count select at / {SLOT}, cell, program, product, "  # noqa: S608 (a number from above)
     "sum(state = 'good'), sum(state = 'bad'), sum(state = 'rejected') "
     "from result where kind = 'unit' group by 1, 2, 3, 4"
 )
-SHORTEST: Final = 3
+MIN_SEARCH_LENGTH: Final = 3
 """Minimum number of characters of a text that `unit_text` finds."""
 _TEXT: Final = "{row}.id, {row}.label, '/' || {row}.cell || '/'"
 _INDEXED: Final = f"insert into unit_text (rowid, serial, cell) values ({_TEXT.format(row='new')});"  # noqa: S608
@@ -86,8 +87,10 @@ _SEARCH: Final = (
 )
 
 
-def add_to(connection: sqlite3.Connection, version: int) -> None:
-    """Add what a file of an older version lacks. A million results of version 1 take about a minute.
+def upgrade_schema(connection: sqlite3.Connection, version: int) -> None:
+    """Add the columns and tables that a file of an older version lacks.
+
+    A million results of version 1 take about a minute.
 
     Raises:
         sqlite3.Error: the file cannot be changed.
@@ -98,11 +101,11 @@ def add_to(connection: sqlite3.Connection, version: int) -> None:
         connection.execute(statement)
 
 
-def texts_match(serial: str, cell: str) -> str:
+def search_expression(serial: str, cell: str) -> str:
     """Return the expression with which `unit_text` finds units by a part of their serial number.
 
     Args:
-        serial: at least SHORTEST characters.
+        serial: at least MIN_SEARCH_LENGTH characters.
         cell: name of a cell; empty for all.
     """
     found = f"serial : {_quoted(serial)}"
@@ -131,5 +134,5 @@ def columns_of(kind: str, stamp: int, document: bytes) -> Columns:
     """Return the columns of a stored record."""
     received = stamp // 1_000_000
     if kind == "unit":
-        return of_unit(msgspec.json.decode(document, type=UnitRecord), {}, received)
-    return of_alarm(msgspec.json.decode(document, type=AlarmRecord), {}, received)
+        return unit_columns(msgspec.json.decode(document, type=UnitRecord), {}, received)
+    return alarm_columns(msgspec.json.decode(document, type=AlarmRecord), {}, received)

@@ -30,11 +30,11 @@ STORE_TIMEOUT: Final = 10.0
 """Time limit for the broker to store a batch of results, s."""
 POLL_PERIOD: Final = 5.0
 """Period in which the outbox is checked, also without an event, and time before a failed batch is sent again, s."""
-CREATE_TIMEOUT: Final = 0.5
+STREAM_CHECK_PERIOD: Final = 0.5
 """Time between two checks whether the stream of this cell exists, s."""
 _ERROR: Final = b'"error":'
 """Part of each record of a unit with a failed step."""
-HEADERS: Final = 4096
+HEADER_SIZE: Final = 4096
 """Size that is left for the headers of a message, bytes."""
 
 
@@ -69,7 +69,9 @@ class Delivery:
                 reported = ""
                 await self._deliver_to(client, stream)
             except NotFoundError:
-                await asyncio.sleep(CREATE_TIMEOUT)  # after the server of the page has seen a state with the domain
+                await asyncio.sleep(
+                    STREAM_CHECK_PERIOD
+                )  # after the server of the page has seen a state with the domain
                 continue
             except (NatsError, TimeoutError, Arcor2Error) as error:
                 if (reason := f"{type(error).__name__}: {error}") != reported:
@@ -89,7 +91,7 @@ class Delivery:
         return stream
 
     async def _deliver_to(self, client: Client, stream: JetStreamContext) -> None:
-        limit = min(client.max_payload, r.MAX_RESULT) - HEADERS
+        limit = min(client.max_payload, r.MAX_RESULT) - HEADER_SIZE
         while True:
             self._added.clear()
             self.waiting = sum([await outbox.count() for outbox in self._outboxes])

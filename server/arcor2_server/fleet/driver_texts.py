@@ -1,4 +1,4 @@
-"""Translations that the drivers of a cell have of its alarms and units. The server of the page knows only its own."""
+"""The drivers' translations of alarms and units of a cell. The server of the page has only those of its own texts."""
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path

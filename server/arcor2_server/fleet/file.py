@@ -83,7 +83,7 @@ class FleetFile:
             if version < _VERSION:
                 with self._connection:
                     self._connection.execute("begin immediate")
-                    columns.add_to(self._connection, version)
+                    columns.upgrade_schema(self._connection, version)
                     self._connection.execute(f"pragma user_version={_VERSION}")
 
     def close(self) -> None:
@@ -129,9 +129,9 @@ class FleetFile:
 
     # -------------------------------------------------------------------------------- results
     def put_results(self, results: Sequence[ReceivedResult]) -> None:
-        """Store results durably. A result that is stored already is replaced by a newer version, else left alone."""
+        """Store results durably. A stored result is replaced only by a newer version."""
         with self._transaction():
-            self._connection.executemany(columns.PUT, [(*each[:-1], *each.columns) for each in results])
+            self._connection.executemany(columns.PUT_RESULT, [(*each[:-1], *each.columns) for each in results])
             self._connection.execute("delete from result where id <= (select max(id) from result) - ?", (MAX_RESULTS,))
 
     def results(self, cell: str, kind: str, before: int, limit: int) -> list[FleetResult]:

@@ -50,7 +50,7 @@ STALE_AFTER: Final = 5.0
 """Age of a state after which it is not published any more, s. The fleet then shows the cell without a signal."""
 FLUSH_TIMEOUT: Final = 2
 """Time limit for the broker to receive a state, s."""
-COUNTED: Final = timedelta(hours=8)
+COUNT_WINDOW: Final = timedelta(hours=8)
 """Period in which units are counted."""
 COUNT_PERIOD: Final = 30.0
 """Longest time between two counts of units, s: units leave the period without an event."""
@@ -65,13 +65,13 @@ class FleetLink:
         outboxes: the results to send; empty without a fleet.
         feed: follows the state of the cell.
         cell: mode and authority.
-        execution: the program.
-        runs: who started it.
-        units: counts of units.
+        execution: state of the program.
+        runs: the users who started programs.
+        units: the produced units.
         alarms: the alarms.
-        users: who is connected.
-        locks: who has locked something.
-        types: have the folders of drivers.
+        users: the connected users.
+        locks: the locks of users.
+        types: the object types; they name the folders of drivers.
     """
 
     def __init__(
@@ -193,13 +193,13 @@ class FleetLink:
             if (before.good, before.bad, before.rejected) != (update.unit.good, update.unit.bad, update.unit.rejected):
                 self._counted = 0.0
         if loop.time() - self._counted > COUNT_PERIOD:
-            since = (datetime.now(UTC) - COUNTED).isoformat(timespec="microseconds")
+            since = (datetime.now(UTC) - COUNT_WINDOW).isoformat(timespec="microseconds")
             self._counts = Counter(await self._units.left_between(since, now()))
             self._counted = loop.time()
         if self._alarms_changed:
             self._alarms_changed = False
             await self._summarise(await self._alarms.find(ListAlarmsArgs(show=AlarmFilter.RETAINED, limit=1000)))
-        self._state, self._collected = self._present(), loop.time()
+        self._state, self._collected = self._current_state(), loop.time()
 
     async def _summarise(self, alarms: list[AlarmRecord]) -> None:
         self._by_priority = Counter(alarm.priority for alarm in alarms)
@@ -215,7 +215,7 @@ class FleetLink:
             translations = await asyncio.to_thread(self._texts.of_text, first)
             self._first_alarm = r.FirstAlarm(first.priority, text, first.raised, _short(device), message, translations)
 
-    def _present(self) -> r.FleetState:
+    def _current_state(self) -> r.FleetState:
         unit, cell, execution = self._unit, self._cell, self._execution
         priorities, counts = self._by_priority, self._counts
         delivery = self._delivery
@@ -244,9 +244,9 @@ class FleetLink:
             low=priorities[Priority.LOW],
             first_alarm=self._first_alarm,
             started_by=_short(self._runs.starter(execution.program.number)) if execution.active else "",
-            users=_some(self._users.names()),
-            controlling=_some(self._locks.owners()),
-            missing=_some(missing),
+            users=_first_names(self._users.names()),
+            controlling=_first_names(self._locks.owners()),
+            missing=_first_names(missing),
             waiting=delivery.waiting,
         )
 
@@ -286,5 +286,5 @@ def _short(name: str) -> str:
     return name[:200]
 
 
-def _some(names: list[str]) -> tuple[str, ...]:
+def _first_names(names: list[str]) -> tuple[str, ...]:
     return tuple(map(_short, names[: r.MAX_NAMES]))

@@ -95,7 +95,7 @@ class FleetState(Data, frozen=True, kw_only=True):
 
 
 class UnitResult(Data, frozen=True, tag="unit", tag_field="kind"):
-    """The record of a unit that has left the cell. identity, translations: as of AlarmResult, of errors of steps."""
+    """The record of a unit that has left the cell. See AlarmResult; the translations are of errors of steps."""
 
     identity: Id
     record: UnitRecord

@@ -62,7 +62,7 @@ class _Cell:
         self.at = at
         """Monotonic time of the last state, s; None if none was received since the start."""
         self.alive = at is not None
-        self.twin_at: float | None = None
+        self.duplicate_at: float | None = None
         """Time of the last state of a process that another one had replaced, s."""
         self.revision = 0
         self.card = FleetCard(
@@ -107,28 +107,28 @@ class Registry:
             return
         if state.boot != cell.boot:
             if state.boot in cell.boots:  # a process that was replaced is still running
-                cell.twin_at = at
+                cell.duplicate_at = at
             else:
                 cell.boots.append(cell.boot)
             cell.boot = state.boot
         elif state.number <= cell.number and cell.at is not None:
             return  # delivered late, or twice
         cell.number, cell.at = state.number, at
-        self._show(cell, state=replace(state, number=0, boot="-"), alive=True, seen=seen)
+        self._update_card(cell, state=replace(state, number=0, boot="-"), alive=True, seen=seen)
 
     def check(self, at: float) -> None:
         """Mark the cells whose last state is too old."""
         for cell in self._cells.values():
             if cell.alive and (cell.at is None or at - cell.at > SILENT_AFTER):
-                self._show(cell, alive=False)
-            if cell.twin_at is not None and at - cell.twin_at > DUPLICATE_TIMEOUT:
-                cell.twin_at = None
+                self._update_card(cell, alive=False)
+            if cell.duplicate_at is not None and at - cell.duplicate_at > DUPLICATE_TIMEOUT:
+                cell.duplicate_at = None
         self._find_conflicts()
 
     def lose_all(self) -> None:
         """Mark all cells as without a signal, because the broker is not connected."""
         for cell in self._cells.values():
-            self._show(cell, alive=False)
+            self._update_card(cell, alive=False)
 
     def remove(self, card_id: str) -> tuple[str, str]:
         """Forget a cell without a signal; return its name and identity.
@@ -148,7 +148,7 @@ class Registry:
         self._find_conflicts()
         return cell.name, cell.identity
 
-    # -------------------------------------------------------------------------------- what is shown
+    # -------------------------------------------------------------------------------- cards
     def cards(self, since: int = -1) -> list[FleetCard]:
         """Return the cards that have changed after a revision."""
         return [cell.card for cell in self._cells.values() if cell.revision > since]
@@ -173,9 +173,9 @@ class Registry:
         for cell in self._cells.values():
             names[cell.name] = names.get(cell.name, 0) + 1
         for cell in self._cells.values():
-            self._show(cell, conflict=names[cell.name] > 1 or cell.twin_at is not None)
+            self._update_card(cell, conflict=names[cell.name] > 1 or cell.duplicate_at is not None)
 
-    def _show(
+    def _update_card(
         self,
         cell: _Cell,
         *,

@@ -19,7 +19,7 @@ from arcor2_server.fleet import records
 from arcor2_server.fleet.collector import Collector
 from arcor2_server.fleet.reports import FleetAlarm, FleetReports, FleetUnit, Period
 
-PAGE: Final = 1000
+PAGE_SIZE: Final = 1000
 """Number of results that are read at once for a file."""
 _LATEST: Final = 1 << 40
 T = TypeVar("T")
@@ -28,7 +28,7 @@ CellFilter = Annotated[str, Parameter(max_length=63)]
 Serial = Annotated[str, Parameter(max_length=200)]
 Before = Annotated[str, Parameter(pattern=r"^(\d{1,13}-\d{1,18})?$")]
 Limit = Annotated[int, Parameter(ge=1, le=1000)]
-Place = tuple[int, int]
+PagePosition = tuple[int, int]
 UNIT_COLUMNS: Final = (
     *(
         "cell",
@@ -55,7 +55,7 @@ def report_routes(collector: Collector) -> list[Any]:
     """Return the routes. All need the role operator."""
     options = {ROLE: Role.OPERATOR}
 
-    async def answered(work: Callable[[FleetReports], Any]) -> Response[bytes]:
+    async def run_query(work: Callable[[FleetReports], Any]) -> Response[bytes]:
         try:
             return json_response(await collector.report(work))
         except (NotFound, StorageError) as error:
@@ -63,7 +63,7 @@ def report_routes(collector: Collector) -> list[Any]:
 
     def units_page(
         period: Period, serial: str
-    ) -> Callable[[Place | None, int], Callable[[FleetReports], list[FleetUnit]]]:
+    ) -> Callable[[PagePosition | None, int], Callable[[FleetReports], list[FleetUnit]]]:
         if serial.strip():
             return lambda before, limit: lambda reports: reports.find_units(serial.strip(), period.cell, before, limit)
         return lambda before, limit: lambda reports: reports.bad_units(period, before, limit)
@@ -71,7 +71,7 @@ def report_routes(collector: Collector) -> list[Any]:
     @get("/api/fleet/production", opt=options)
     async def production(since: Second, until: Second, cell: CellFilter = "") -> Response[bytes]:
         """Return the units of a period by cell, product and program, and over time."""
-        return await answered(lambda reports: reports.production(Period(since, until, cell)))
+        return await run_query(lambda reports: reports.production(Period(since, until, cell)))
 
     @get("/api/fleet/units", opt=options)
     async def units(
@@ -84,20 +84,20 @@ def report_routes(collector: Collector) -> list[Any]:
     ) -> Response[bytes]:
         """Return the bad units of a period, or all units with a text in their serial number; the newest first."""
         page = units_page(Period(since, until, cell), serial)
-        return await answered(page(_place(before), limit))
+        return await run_query(page(_page_position(before), limit))
 
     @get("/api/fleet/units/{number:int}", opt=options)
     async def unit(number: int) -> Response[bytes]:
         """Return the whole record of a unit."""
-        return await answered(lambda reports: reports.unit(number))
+        return await run_query(lambda reports: reports.unit(number))
 
     @get("/api/fleet/units/export", opt=options)
     async def export_units(
         since: Second = 0, until: Second = _LATEST, cell: CellFilter = "", serial: Serial = ""
     ) -> Stream:
-        """Return the same units as CSV."""
+        """Return the units as CSV that `units` returns."""
         page = units_page(Period(since, until, cell), serial)
-        return _file("units.csv", UNIT_COLUMNS, _pages(lambda *place: collector.report(page(*place))), _unit_row)
+        return _file("units.csv", UNIT_COLUMNS, _pages(lambda *position: collector.report(page(*position))), _unit_row)
 
     @get("/api/fleet/alarms", opt=options)
     async def alarms(
@@ -105,19 +105,19 @@ def report_routes(collector: Collector) -> list[Any]:
     ) -> Response[bytes]:
         """Return the alarms that were raised in a period, the newest first."""
         period = Period(since, until, cell)
-        return await answered(lambda reports: reports.alarms(period, _place(before), limit))
+        return await run_query(lambda reports: reports.alarms(period, _page_position(before), limit))
 
     @get("/api/fleet/causes", opt=options)
     async def causes(since: Second = 0, until: Second = _LATEST, cell: CellFilter = "") -> Response[bytes]:
         """Return the causes of the alarms of a period, the most frequent first."""
-        return await answered(lambda reports: reports.causes(Period(since, until, cell)))
+        return await run_query(lambda reports: reports.causes(Period(since, until, cell)))
 
     @get("/api/fleet/alarms/export", opt=options)
     async def export_alarms(since: Second = 0, until: Second = _LATEST, cell: CellFilter = "") -> Stream:
         """Return the alarms of a period as CSV."""
         period = Period(since, until, cell)
 
-        def load(before: Place | None, limit: int) -> Awaitable[list[FleetAlarm]]:
+        def load(before: PagePosition | None, limit: int) -> Awaitable[list[FleetAlarm]]:
             return collector.report(lambda reports: reports.alarms(period, before, limit))
 
         return _file("alarms.csv", ALARM_COLUMNS, _pages(load), _alarm_row)
@@ -136,16 +136,16 @@ def refusal(error: Arcor2Error) -> HTTPException:
     return HTTPException(status_code=status, detail=str(error), extra=error.message.translation())
 
 
-def _place(before: str) -> Place | None:
+def _page_position(before: str) -> PagePosition | None:
     if not before:
         return None
     at, _, number = before.partition("-")
     return int(at), int(number)
 
 
-async def _pages(load: Callable[[Place | None, int], Awaitable[list[T]]]) -> AsyncIterator[list[T]]:
-    before: Place | None = None
-    while found := await load(before, PAGE):
+async def _pages(load: Callable[[PagePosition | None, int], Awaitable[list[T]]]) -> AsyncIterator[list[T]]:
+    before: PagePosition | None = None
+    while found := await load(before, PAGE_SIZE):
         yield found
         last: Any = found[-1]
         before = last.at, last.id

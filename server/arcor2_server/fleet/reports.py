@@ -12,17 +12,17 @@ import msgspec
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.units import UnitRecord
 from arcor2_hw.exceptions import NotFound, StorageError
-from arcor2_server.fleet.columns import SHORTEST, SLOT, texts_match
+from arcor2_server.fleet.columns import MIN_SEARCH_LENGTH, SLOT, search_expression
 from arcor2_server.fleet.summaries import AlarmSummary, UnitSummary
 
 HOUR: Final = 3600
-_LONG: Final = 49 * HOUR
+_LONG_PERIOD: Final = 49 * HOUR
 """Length of a period from which it is divided into parts of 6 hours instead of 1 hour, s."""
 _MAX_CAUSES: Final = 50
 """Maximum number of causes of alarms."""
 _BAD: Final = "state in ('bad', 'rejected')"
-_FOUND: Final = "unit_text join result on result.id = unit_text.rowid where unit_text match ?"
-_SCANNED: Final = "result indexed by unit_by_id where kind = 'unit' and label like ? escape '\\'"
+_FROM_INDEX: Final = "unit_text join result on result.id = unit_text.rowid where unit_text match ?"
+_FROM_SCAN: Final = "result indexed by unit_by_id where kind = 'unit' and label like ? escape '\\'"
 _unit = msgspec.json.Decoder(UnitSummary).decode
 _alarm = msgspec.json.Decoder(AlarmSummary).decode
 _record = msgspec.json.Decoder(UnitRecord).decode
@@ -123,9 +123,9 @@ class FleetReports:
     def production(self, period: Period) -> FleetProduction:
         """Return the units of a period by cell, product and program, and over time."""
         first, end = period.since // SLOT, -(-period.until // SLOT)
-        step = (6 * HOUR if (end - first) * SLOT > _LONG else HOUR) // SLOT
-        of_cell, values = _of_cell(period)
-        where = f"from unit_count where slot >= ? and slot < ?{of_cell}"
+        step = (6 * HOUR if (end - first) * SLOT > _LONG_PERIOD else HOUR) // SLOT
+        cell_condition, values = _cell_condition(period)
+        where = f"from unit_count where slot >= ? and slot < ?{cell_condition}"
         sums = "sum(good), sum(bad), sum(rejected)"
         counts = self._rows(
             f"select cell, product, program, {sums} {where} group by cell, product, program", first, end, *values
@@ -143,18 +143,18 @@ class FleetReports:
         )
 
     def bad_units(self, period: Period, before: tuple[int, int] | None, limit: int) -> list[FleetUnit]:
-        """Return bad and rejected units of a period, the newest first. Arguments as of `alarms`."""
-        of_cell, values = _of_cell(period)
-        where = f"{_BAD} and at >= ? and at < ?{of_cell}"
-        return _units(self._listed("unit", where, (period.since, period.until, *values), before, limit))
+        """Return bad and rejected units of a period, the newest first. Arguments: see `alarms`."""
+        cell_condition, values = _cell_condition(period)
+        where = f"{_BAD} and at >= ? and at < ?{cell_condition}"
+        return _units(self._page("unit", where, (period.since, period.until, *values), before, limit))
 
     def find_units(self, serial: str, cell: str, before: tuple[int, int] | None, limit: int) -> list[FleetUnit]:
-        """Return all units whose serial number contains a text, the last stored first. Arguments as of `alarms`."""
+        """Return all units whose serial number contains a text, the last stored first. Arguments: see `alarms`."""
         if "\0" in serial + cell:
             return []  # no serial number contains it, and SQLite would end the text there
-        indexed = len(serial) >= SHORTEST
-        values: list[object] = [texts_match(serial, cell) if indexed else f"%{_escaped(serial)}%"]
-        where = f"{_FOUND if indexed else _SCANNED}{' and result.cell = ?' if cell else ''}"
+        indexed = len(serial) >= MIN_SEARCH_LENGTH
+        values: list[object] = [search_expression(serial, cell) if indexed else f"%{_escaped(serial)}%"]
+        where = f"{_FROM_INDEX if indexed else _FROM_SCAN}{' and result.cell = ?' if cell else ''}"
         values += [cell] if cell else []
         number = "unit_text.rowid" if indexed else "id"
         if before is not None:
@@ -178,9 +178,9 @@ class FleetReports:
             before: `at` and `id` of the last one of the previous page; None for the first page.
             limit: maximum number.
         """
-        of_cell, values = _of_cell(period)
-        rows = self._listed(
-            "alarm", f"at >= ? and at < ?{of_cell}", (period.since, period.until, *values), before, limit
+        cell_condition, values = _cell_condition(period)
+        rows = self._page(
+            "alarm", f"at >= ? and at < ?{cell_condition}", (period.since, period.until, *values), before, limit
         )
         present = int(time.time())
         return [
@@ -190,11 +190,11 @@ class FleetReports:
 
     def causes(self, period: Period) -> list[FleetCause]:
         """Return the causes of the alarms of a period, the most frequent first."""
-        of_cell, values = _of_cell(period)
+        cell_condition, values = _cell_condition(period)
         query = (
             "select cell, sum(times), sum(max(0, coalesce(until, ?) - at)), max(id) "  # noqa: S608 (texts from above)
             "from result "
-            f"where kind = 'alarm' and at >= ? and at < ?{of_cell} "
+            f"where kind = 'alarm' and at >= ? and at < ?{cell_condition} "
             "group by cell, label order by 2 desc, 3 desc limit ?"
         )
         rows = self._rows(query, int(time.time()), period.since, period.until, *values, _MAX_CAUSES)
@@ -207,7 +207,7 @@ class FleetReports:
             if number in summaries  # deleted meanwhile
         ]
 
-    def _listed(
+    def _page(
         self, kind: str, where: str, values: tuple[object, ...], before: tuple[int, int] | None, limit: int
     ) -> list[Any]:
         if before is not None:
@@ -229,5 +229,5 @@ def _escaped(text: str) -> str:
     return text.replace("\\", "\\\\").replace("%", "\\%").replace("_", "\\_")
 
 
-def _of_cell(period: Period) -> tuple[str, tuple[str, ...]]:
+def _cell_condition(period: Period) -> tuple[str, tuple[str, ...]]:
     return (" and cell = ?", (period.cell,)) if period.cell else ("", ())

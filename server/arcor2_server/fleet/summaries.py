@@ -1,4 +1,4 @@
-"""What lists and counts need of a stored result, from its record."""
+"""Extracts from the record of a result the data that lists and counts need."""
 
 from datetime import datetime
 from typing import Final, NamedTuple
@@ -16,7 +16,7 @@ BAD: Final = (UnitState.BAD, UnitState.REJECTED)
 _encode = msgspec.json.Encoder().encode
 _FALSE: Final = "false"
 """Result of an action that has tested a part and found it bad, as JSON."""
-_LONGEST: Final = 1000
+_MAX_ERROR_LENGTH: Final = 1000
 """Maximum size of the text of an error, characters."""
 
 
@@ -61,7 +61,7 @@ class Columns(NamedTuple):
     summary: bytes
 
 
-def of_unit(record: UnitRecord, translations: Translations, received: int) -> Columns:
+def unit_columns(record: UnitRecord, translations: Translations, received: int) -> Columns:
     """Return the columns of a unit.
 
     Args:
@@ -75,7 +75,7 @@ def of_unit(record: UnitRecord, translations: Translations, received: int) -> Co
     error = ""
     message: Message | Unset = UNSET
     if step is not None and not isinstance(step.error, Unset):
-        error = step.error[:_LONGEST]
+        error = step.error[:_MAX_ERROR_LENGTH]
         if step.error == error and not isinstance(step.key, Unset):
             message = step.as_message(error)
     summary = UnitSummary(
@@ -118,8 +118,8 @@ class AlarmSummary(Data, frozen=True):
     translations: Translations = field(default_factory=dict)
 
 
-def of_alarm(record: AlarmRecord, translations: Translations, received: int) -> Columns:
-    """Return the columns of an alarm. Arguments as of `of_unit`."""
+def alarm_columns(record: AlarmRecord, translations: Translations, received: int) -> Columns:
+    """Return the columns of an alarm. For the arguments see `unit_columns`."""
     device = "" if isinstance(record.object_id, Unset) else record.object_id
     at = _seconds(record.raised, received)
     until = None
@@ -132,8 +132,8 @@ def of_alarm(record: AlarmRecord, translations: Translations, received: int) -> 
     return Columns(at, until, record.priority, cause, "", "", record.count, summary)
 
 
-def _seconds(time: Timestamp, otherwise: int) -> int:
+def _seconds(time: Timestamp, default: int) -> int:
     try:
         return int(datetime.fromisoformat(time).timestamp())
     except (ValueError, OverflowError, OSError):
-        return otherwise
+        return default

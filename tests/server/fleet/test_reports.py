@@ -22,7 +22,7 @@ from arcor2_server.fleet.columns import SLOT, columns_of
 from arcor2_server.fleet.driver_texts import DriverTexts, texts_of
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
 from arcor2_server.fleet.reports import FleetReports, Period
-from arcor2_server.fleet.summaries import UnitSummary, of_alarm, of_unit
+from arcor2_server.fleet.summaries import UnitSummary, alarm_columns, unit_columns
 from tests.ports import free_port
 from tests.server.fleet.cells import unit
 from tests.server.fleet.test_results import FleetProcess
@@ -233,7 +233,7 @@ def test_an_alarm_contains_the_translations_of_its_driver(tmp_path: Path) -> Non
     (folder / "notes.json").write_text("{}")
     found = texts.of(texts_of(record))
     assert found == {"cs": {"No part.": "Chybí díl."}}
-    stored = msgspec.json.decode(of_alarm(record, found, 0).summary)
+    stored = msgspec.json.decode(alarm_columns(record, found, 0).summary)
     assert stored["translations"] == found
     (folder / "cs.json").write_text('{"No part.": "Žádný díl.", "Clean the jaws.": "Očistěte čelisti."}')
     assert texts.of(texts_of(record))["cs"] == {"No part.": "Žádný díl.", "Clean the jaws.": "Očistěte čelisti."}
@@ -252,12 +252,12 @@ def test_a_bad_unit_contains_the_translations_of_its_errors(
     translations = texts.of_unit(record)
     assert translations == {"cs": {error.key: "Žádný oblouk při {amps} A."}}
     assert texts.of_unit(finished(1, 1)) == {}
-    file.put_results([received(record)._replace(columns=of_unit(record, translations, NOON))])
+    file.put_results([received(record)._replace(columns=unit_columns(record, translations, NOON))])
     unit = reports.bad_units(DAY, None, 1)[0].unit
     assert (unit.error, unit.message, unit.translations) == ("No arc at 40 A.", error, translations)
     # A long error is shortened, and is not translated.
     long = replace(failed, error="x" * 5000)
-    shown = msgspec.json.decode(of_unit(replace(record, steps=[long]), {}, NOON).summary, type=UnitSummary)
+    shown = msgspec.json.decode(unit_columns(replace(record, steps=[long]), {}, NOON).summary, type=UnitSummary)
     assert (len(shown.error), shown.message) == (1000, UNSET)
 
 
