@@ -16,7 +16,7 @@ from arcor2_hw.exceptions import Arcor2Error, Conflict, InvalidData, NotFound
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.deployment import minisign
 from arcor2_server.deployment.installation import NAME, UNIT, CommandFailed, Installation, run
-from arcor2_server.deployment.upgrade import READY_TIMEOUT, Systemd, UpgradeFailed, checked, upgrade as upgrade_to
+from arcor2_server.deployment.upgrade import READY_TIMEOUT, Systemd, UpgradeFailed, check_bundle, upgrade as upgrade_to
 
 PUBLIC: Final = 0o022
 """Mask of the permissions of programs, which all users may read."""
@@ -95,7 +95,7 @@ def upgrade(
                 # Only files without compression are accepted, which are not larger when they are unpacked.
                 with tarfile.open(bundle, "r:") as archive:
                     archive.extractall(directory, filter="data")
-            new = checked(directory, here.public_key, unsigned)
+            new = check_bundle(directory, here.public_key, unsigned)
             user = NAME if root == Path("/") else None
             upgrade_to(here, directory, new, Systemd(), _report, user)
     except (Arcor2Error, OSError, tarfile.TarError) as error:

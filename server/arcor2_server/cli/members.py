@@ -118,7 +118,7 @@ def accept(
             server = where if used == pairing.PORT else f"{where}:{used}"
             sys.stdout.write(f"Run {place}: arcor2-hw {group} pair {name} --server {server}\nCode: {invitation.code}\n")
             sys.stdout.flush()
-            return await invitation.accepted()
+            return await invitation.wait_accepted()
 
     key = pairing.short_key(asyncio.run(waiting()))
     sys.stdout.write(f"accepted {name}, key {key}\n")

@@ -167,7 +167,7 @@ def _files(directory: Path, prefix: str = "") -> Iterator[str]:
     with os.scandir(directory) as found:
         for entry in found:
             name = entry.name
-            if not prefix and (name in _DERIVED or _stays(name)):
+            if not prefix and (name in _DERIVED or _is_excluded(name)):
                 continue
             # Names that start with a dot are files that are being written.
             if name.startswith(".") or name.endswith(("-wal", "-shm", "-journal")):
@@ -178,7 +178,7 @@ def _files(directory: Path, prefix: str = "") -> Iterator[str]:
                 yield prefix + name
 
 
-def _stays(name: str) -> bool:
+def _is_excluded(name: str) -> bool:
     """Return whether an entry of the data directory is neither copied nor replaced."""
     return name in (LOCK, BACKUPS) or name.startswith(REPLACED_PREFIX)
 
@@ -307,7 +307,7 @@ def read_manifest(archive: zipfile.ZipFile) -> Manifest:
             or "\\" in name
             or str(path) != name
             or name.startswith(".")
-            or _stays(path.parts[0])
+            or _is_excluded(path.parts[0])
         ):
             raise InvalidData("The backup contains the invalid path {path}.", path=name)
     return manifest
@@ -362,7 +362,7 @@ def finish_restoration(data_dir: Path) -> None:
         if ready.exists():
             replaced.mkdir(DIRECTORY_MODE, exist_ok=True)
             for entry in list(data_dir.iterdir()):
-                if not _stays(entry.name) and entry not in (ready, replaced):
+                if not _is_excluded(entry.name) and entry not in (ready, replaced):
                     entry.rename(replaced / entry.name)
             sync(data_dir)
             ready.rename(moving)
@@ -372,12 +372,12 @@ def finish_restoration(data_dir: Path) -> None:
             sync(data_dir)
             moving.rmdir()
         if replaced.exists():
-            replaced.rename(_unused(data_dir))
+            replaced.rename(_unused_path(data_dir))
     except OSError as error:
         raise StorageError("{directory} cannot be restored: {reason}.", directory=data_dir, reason=error) from error
 
 
-def _unused(data_dir: Path) -> Path:
+def _unused_path(data_dir: Path) -> Path:
     """Return an unused path for replaced files."""
     stamp = now()[:19].replace(":", "").replace("-", "")
     path, number = data_dir / f"{REPLACED_PREFIX}-{stamp}", 1

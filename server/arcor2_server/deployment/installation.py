@@ -175,7 +175,7 @@ class Installation(msgspec.Struct, frozen=True):
             raise NotFound("Version {version} is not installed in {path}.", version=version, path=self.programs)
         try:
             for unit in UNITS:
-                _write(self.units / unit, _text_of(unit))
+                _write(self.units / unit, _unit_text(unit))
             if not self.settings.exists():
                 _write(self.settings, _SETTINGS)
             _link(self.current, Path(str(version)))
@@ -202,7 +202,7 @@ class Installation(msgspec.Struct, frozen=True):
         shutil.rmtree(self.path_of(version), ignore_errors=True)
 
 
-def _text_of(unit: str) -> str:
+def _unit_text(unit: str) -> str:
     """Return a unit of this version, with those groups for devices that exist on this machine."""
     existing = {group.gr_name for group in grp.getgrall()}
     lines = resources.files("arcor2_server.deployment").joinpath(unit).read_text().splitlines(keepends=True)
@@ -215,16 +215,16 @@ def _text_of(unit: str) -> str:
 
 def _write(path: Path, text: str) -> None:
     path.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
-    fresh = path.with_name(f".{path.name}.new")
-    fresh.write_text(text)
-    fresh.chmod(0o644)
-    fresh.replace(path)
+    temporary = path.with_name(f".{path.name}.new")
+    temporary.write_text(text)
+    temporary.chmod(0o644)
+    temporary.replace(path)
 
 
 def _link(path: Path, target: Path) -> None:
     """Set a link atomically."""
     path.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
-    fresh = path.with_name(f".{path.name}.new")
-    fresh.unlink(missing_ok=True)
-    fresh.symlink_to(target)
-    fresh.replace(path)
+    temporary = path.with_name(f".{path.name}.new")
+    temporary.unlink(missing_ok=True)
+    temporary.symlink_to(target)
+    temporary.replace(path)

@@ -93,14 +93,14 @@ def upgrade(
     commands = {each: installation.path_of(each) / "bin" / NAME for each in (old, version)}
     run([commands[version], "--version"])
     report("stopping the service")
-    copy = installation.data / BACKUPS / f"before-{version}.zip"
+    backup = installation.data / BACKUPS / f"before-{version}.zip"
     stored = False
     try:
         services.stop(STOPPED_TIMEOUT)
-        report(f"copying the data to {copy}")
-        run(["install", "-d", "-m", "700", copy.parent], user=user)
+        report(f"copying the data to {backup}")
+        run(["install", "-d", "-m", "700", backup.parent], user=user)
         data = ("--data-dir", installation.data)
-        run([commands[old], "backup", copy, "--force", *data], BACKUP_TIMEOUT, user)
+        run([commands[old], "backup", backup, "--force", *data], BACKUP_TIMEOUT, user)
         stored = True
         report(f"starting version {version}")
         run([commands[version], "install", "--select-only", "--root", installation.root])
@@ -108,7 +108,7 @@ def upgrade(
     except CommandFailed as error:
         report(f"{error}; going back to version {old}")
         log.error("upgrade failed", version=str(version), reason=str(error))
-        _go_back(installation, services, old, copy if stored else None, user)
+        _go_back(installation, services, old, backup if stored else None, user)
         installation.remove(version)
         raise UpgradeFailed(
             "Version {new} did not start ({reason}). Version {old} runs again with its data.",
@@ -121,19 +121,21 @@ def upgrade(
             installation.remove(other)
 
 
-def _go_back(installation: Installation, services: Services, old: Version, copy: Path | None, user: str | None) -> None:
+def _go_back(
+    installation: Installation, services: Services, old: Version, backup: Path | None, user: str | None
+) -> None:
     try:
         services.stop(STOPPED_TIMEOUT)
     except CommandFailed as error:
         log.warning("the service cannot be stopped", reason=str(error))
     installation.select(old)
-    if copy is not None:
+    if backup is not None:
         command = installation.path_of(old) / "bin" / NAME
-        run([command, "restore", copy, "--data-dir", installation.data], BACKUP_TIMEOUT, user)
+        run([command, "restore", backup, "--data-dir", installation.data], BACKUP_TIMEOUT, user)
     services.start(READY_TIMEOUT)
 
 
-def checked(bundle: Path, key: Path, unsigned: bool) -> Version:
+def check_bundle(bundle: Path, key: Path, unsigned: bool) -> Version:
     """Check a bundle with the stored key, and return its version.
 
     Args:

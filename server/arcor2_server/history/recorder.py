@@ -63,7 +63,7 @@ class PointRecorder:
         self.dropped = 0
         """Number of values that were lost because they could not be stored."""
 
-    def reported(self, object_id: str, object_name: str, points: Iterable[LivePoint], at: int) -> None:
+    def device_reported(self, object_id: str, object_name: str, points: Iterable[LivePoint], at: int) -> None:
         """Record the changed points of a device. at: time of the report, ms since 1970."""
         known = self._points.setdefault(object_id, {})
         for point in points:
@@ -77,7 +77,7 @@ class PointRecorder:
             if isinstance(value, str):
                 value = value[:MAX_TEXT]
             since = at - recorded.time
-            if recorded.quality is point.quality and _equal(recorded.value, value, recorded.band):
+            if recorded.quality is point.quality and _within_band(recorded.value, value, recorded.band):
                 if 0 <= since < REPEATED_AFTER_MS:
                     continue
                 time = at
@@ -85,15 +85,15 @@ class PointRecorder:
                 continue  # the next report records the change if it persists
             self._record(recorded, time, value, point.quality)
 
-    def lost(self, object_id: str, quality: PointQuality, at: int) -> None:
-        """Record that the device is not connected, so its values are unknown."""
+    def values_unknown(self, object_id: str, quality: PointQuality, at: int) -> None:
+        """Record that the values of a device are unknown, since it is not connected or cannot read them."""
         for recorded in self._points.get(object_id, {}).values():
             if recorded.quality not in _UNKNOWN:
                 self._record(recorded, at, None, quality)
 
-    def gone(self, object_id: str, at: int) -> None:
+    def device_removed(self, object_id: str, at: int) -> None:
         """Record that a device is no longer in operation."""
-        self.lost(object_id, PointQuality.NOT_CONNECTED, at)
+        self.values_unknown(object_id, PointQuality.NOT_CONNECTED, at)
         self._count -= len(self._points.pop(object_id, {}))
 
     def _added(self, object_id: str, object_name: str, point: LivePoint) -> RecordedPoint:
@@ -132,7 +132,7 @@ class PointRecorder:
         self._waiting = kept + self._waiting
 
 
-def _equal(a: PointValue, b: PointValue, band: float) -> bool:
+def _within_band(a: PointValue, b: PointValue, band: float) -> bool:
     if isinstance(a, bool | int | float) and isinstance(b, bool | int | float):
         return abs(a - b) <= band
     return a == b

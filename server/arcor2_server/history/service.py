@@ -152,18 +152,18 @@ class History:
 
     def _devices_gone(self, objects: list[str]) -> None:
         for object_id in objects:
-            self._recorder.gone(object_id, self._now())
+            self._recorder.device_removed(object_id, self._now())
 
     def _received(self, host: HostSession, encoded: bytes) -> None:
         data = _decode_points(encoded).data
         if data.reason:
-            self._recorder.lost(data.object_id, PointQuality.BAD, self._now())
+            self._recorder.values_unknown(data.object_id, PointQuality.BAD, self._now())
             return
         try:
             name = host.board.object(data.object_id).name
         except NotFound:
             return
-        self._recorder.reported(data.object_id, name, data.points, self._now())
+        self._recorder.device_reported(data.object_id, name, data.points, self._now())
 
     def run_ended(self, run: Run) -> None:
         """Record a run that has ended."""

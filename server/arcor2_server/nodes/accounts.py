@@ -33,9 +33,9 @@ UPDATE_TIMEOUT: Final = 2.0
 
 
 class Members(NamedTuple):
-    """What the members of an account are.
+    """The rules for the members of an account.
 
-    command: the group of commands for them. rights: returns those of a member by its name and kind.
+    command: the group of commands that manage them. rights: returns the rights of a member by its name and kind.
     server: rights of the server; None for everything in the account.
     """
 
@@ -98,7 +98,7 @@ class Accounts:
 
     Args:
         settings: name the files, which are created when they are needed.
-        members: what its members are.
+        members: the rules for its members.
     """
 
     def __init__(self, settings: ServerSettings, members: Members = NODES) -> None:
@@ -189,7 +189,7 @@ class Accounts:
             kind: kind of the member.
 
         Raises:
-            InvalidData, NotFound, Conflict: as of `check_new`.
+            InvalidData, NotFound, Conflict: see `check_new`.
             StorageError: the file cannot be written.
         """
         with self._locked():

@@ -36,28 +36,28 @@ RETRY_PERIOD: Final = 2.0
 """Period of the attempts to connect to the broker, s."""
 
 
-class _Known:
+class _KnownNode:
     """A node that has announced itself. Time stamps are computed once, so that nothing seems to change later."""
 
     def __init__(self, announced: Announcement, moment: float) -> None:
-        self.since = _before(announced.age)
+        self.since = _time_ago(announced.age)
         self.sessions: dict[str, Timestamp] = {}
         self.error: tuple[Message, Timestamp] | None = None
         self.take(announced, moment)
 
     def take(self, announced: Announcement, moment: float) -> None:
         """Store an announcement that arrived at this time of the clock of the board, s."""
-        self.announced, self.seen, self.seen_at = announced, moment, _before(0.0)
-        self.sessions = {each.id: self.sessions.get(each.id) or _before(each.age) for each in announced.sessions}
+        self.announced, self.seen, self.seen_at = announced, moment, _time_ago(0.0)
+        self.sessions = {each.id: self.sessions.get(each.id) or _time_ago(each.age) for each in announced.sessions}
         error = announced.error
         if error is None:
             self.error = None
         elif self.error is None or self.error[0] != error.text or error.age < PERIOD:
-            self.error = (error.text, _before(error.age))
+            self.error = (error.text, _time_ago(error.age))
 
 
-def _before(age: float) -> Timestamp:
-    """Return the time stamp of what happened some seconds ago."""
+def _time_ago(age: float) -> Timestamp:
+    """Return the time stamp of an event that is `age` seconds old."""
     return (datetime.now(UTC) - timedelta(seconds=age)).isoformat(timespec="seconds")
 
 
@@ -89,7 +89,7 @@ class NodeBoard:
         self._needed = needed
         self._is_configured, self._environment = configured, environment
         self._clock, self._apart = clock, apart
-        self._known: dict[str, _Known] = {}
+        self._known: dict[str, _KnownNode] = {}
         self._missing_since: dict[str, float] = {}
         self._problem: Message | None = None
         self._published: NodesData | None = None
@@ -102,7 +102,7 @@ class NodeBoard:
         self._background.spawn(self._watch(), "state of nodes")
 
     async def close(self) -> None:
-        """End it."""
+        """Stop following the nodes."""
         await self._background.cancel()
 
     # -------------------------------------------------------------------------------- announcements
@@ -111,7 +111,7 @@ class NodeBoard:
         known, moment = self._known.get(announced.name), self._clock()
         if known is None or known.announced.service != announced.service:
             log.info("node seen", node=announced.name, computer=announced.computer, version=announced.version)
-            self._known[announced.name] = _Known(announced, moment)
+            self._known[announced.name] = _KnownNode(announced, moment)
         else:
             known.take(announced, moment)
 
@@ -181,7 +181,7 @@ class NodeBoard:
         """Publish the nodes if they have changed."""
         data, moment = self.data(), self._clock()
         due = moment - self._published_at >= LOAD_PERIOD
-        if data == self._published or (not due and _lasting(data) == _lasting(self._published)):
+        if data == self._published or (not due and _without_load(data) == _without_load(self._published)):
             return
         self._published, self._published_at = data, moment
         self._hub.broadcast(make_event("NodesChanged", data))
@@ -245,6 +245,6 @@ def _error(message: Message, at: Timestamp) -> NodeError:
     return NodeError(message.text, at, **message.translation())
 
 
-def _lasting(data: NodesData | None) -> NodesData | None:
-    """Return the nodes without what changes all the time."""
+def _without_load(data: NodesData | None) -> NodesData | None:
+    """Return the nodes without load and free space, which change all the time."""
     return data and replace(data, nodes=[replace(each, load=UNSET, free=UNSET) for each in data.nodes])

@@ -43,7 +43,7 @@ def answer_subject(node: str) -> str:
 async def connect(credentials: Credentials, node: str, lost: Callable[[], None] = lambda: None) -> Connections:
     """Connect to the broker once for each lane, for a session with a node or at the node.
 
-    Other arguments and errors as of `connect_client`.
+    For the other arguments and the errors see `connect_client`.
     """
     connections: dict[Lane, Client] = {}
     try:
@@ -98,7 +98,7 @@ async def connect_client(
                 **options,
             )
     except (NatsError, OSError, TimeoutError) as error:
-        await _close(client)  # also a refused one has a socket
+        await _close(client)  # the socket of a refused connection is open, too
         detail, address = f"{type(error).__name__}: {error}", address_of(credentials.url)
         if REFUSAL in str(error).lower():
             raise CredentialsRefused(

@@ -29,7 +29,7 @@ HASH_SIZE: Final = 32
 """Length of a hash, bytes."""
 MAX_STORE_SIZE: Final = 4 * 1024**3
 """Size above which files are removed from the store of a node, bytes; on a small disk a quarter of it."""
-IN_USE: Final = 600.0
+KEEP_TIME: Final = 600.0
 """Time for which a file is kept after its last use, s: messages on their way may need it, also those of other nodes."""
 PRUNE_PERIOD: Final = 60.0
 """Time between two searches for files that can be removed, s."""
@@ -67,7 +67,7 @@ class Content:
                 recordings="",  # the relay stores it
                 records_at_server=bool(message.records),
             )
-        return msgspec.msgpack.encode(_mapped(message, self._add_named))
+        return msgspec.msgpack.encode(_with_file_names(message, self._add_named))
 
     def _add_named(self, name: str) -> str:
         return f"{_SCHEME}{self._add(Path(name))}:{Path(name).name}"
@@ -105,10 +105,10 @@ class ContentStore:
         self._pruned_at = -PRUNE_PERIOD
 
     def missing(self, hashes: list[str]) -> list[str]:
-        """Return the hashes of files that the store does not have. The others are kept for `IN_USE` at least."""
-        return [digest for digest in hashes if not self._used(self._file(digest))]
+        """Return the hashes of files that the store does not have. The others are kept for `KEEP_TIME` at least."""
+        return [digest for digest in hashes if not self._mark_used(self._file(digest))]
 
-    def _used(self, file: Path) -> bool:
+    def _mark_used(self, file: Path) -> bool:
         """Note that a file is used; return whether it exists."""
         try:
             os.utime(file)
@@ -132,7 +132,7 @@ class ContentStore:
             files = sorted((status.st_mtime, status.st_size, each.path) for each in entries if (status := each.stat()))
         self._size = sum(size for _, size, _ in files)
         for used, size, path in files:
-            if self._size <= limit or time.time() - used < IN_USE:
+            if self._size <= limit or time.time() - used < KEEP_TIME:
                 return
             Path(path).unlink(missing_ok=True)
             self._size -= size
@@ -168,7 +168,7 @@ class ContentStore:
         message = m.decode_host_bound(body)
         if isinstance(message, m.RunPackage):
             message = replace(message, directory=str(self._directory_of(message.directory, folder)))
-        return msgspec.msgpack.encode(_mapped(message, lambda reference: str(self._named(reference, folder))))
+        return msgspec.msgpack.encode(_with_file_names(message, lambda reference: str(self._named(reference, folder))))
 
     def _named(self, reference: str, folder: Path) -> Path:
         digest, name = _parts(reference)
@@ -218,7 +218,7 @@ def _parts(reference: str) -> tuple[str, str]:
     return digest, name
 
 
-def _mapped(message: Any, convert: Callable[[str], str]) -> Any:
+def _with_file_names(message: Any, convert: Callable[[str], str]) -> Any:
     """Return a message with other names of its files."""
 
     def body(given: m.AddedBody) -> m.AddedBody:
@@ -228,7 +228,7 @@ def _mapped(message: Any, convert: Callable[[str], str]) -> Any:
         case m.AddBody():
             return replace(message, body=body(message.body))
         case m.AddObject():
-            return replace(message, opening=_mapped(message.opening, convert))
+            return replace(message, opening=_with_file_names(message.opening, convert))
         case m.OpenScene() | m.RunPackage():
             assets = {key: convert(file) for key, file in message.assets.items()}
             return replace(message, assets=assets, bodies=[body(each) for each in message.bodies])

@@ -44,36 +44,36 @@ class MessageOutline(msgspec.Struct, frozen=True):
 
     @property
     def passive(self) -> bool:
-        """Whether the message starts nothing at a device, so that its age does not matter. The end of a hold is."""
+        """Whether the message starts nothing at a device, so its age does not matter. The end of a hold is passive."""
         return self.type in PASSIVE or self.until == 0.0
 
 
 outline: Callable[[bytes], MessageOutline] = msgspec.msgpack.Decoder(MessageOutline).decode
 
 
-def for_host(kind: str, body: bytes, here: Callable[[float], float]) -> bytes:
+def for_host(kind: str, body: bytes, local_time: Callable[[float], float]) -> bytes:
     """Return a message of the server with its times on the clock of this computer.
 
     Args:
         kind: type of the message.
         body: the encoded message.
-        here: converts a time of the server's clock.
+        local_time: converts a time of the server's clock.
     """
     if kind not in TIMED:
         return body
     message = m.decode_host_bound(body)
-    return _encode(replace(message, until=here(message.until))) if message.until else body
+    return _encode(replace(message, until=local_time(message.until))) if message.until else body
 
 
-def for_server(kind: str, body: bytes, here: Callable[[float], float]) -> bytes:
-    """Return a message of a cell host with its times on the clock of this computer. Arguments as of `for_host`."""
+def for_server(kind: str, body: bytes, local_time: Callable[[float], float]) -> bytes:
+    """Return a message of a cell host with its times on the clock of this computer. See `for_host`."""
     if kind not in STAMPED:
         return body
     message = m.decode_server_bound(body)
     changed: dict[str, Any] = {}
     if isinstance(message, m.DeviceChanged):
-        changed["stamp"] = here(message.stamp)
-        changed["raised"] = {code: here(moment) for code, moment in message.raised.items()}
+        changed["stamp"] = local_time(message.stamp)
+        changed["raised"] = {code: local_time(moment) for code, moment in message.raised.items()}
     elif message.error is not None and message.error.stamp:
-        changed["error"] = replace(message.error, stamp=here(message.error.stamp))
+        changed["error"] = replace(message.error, stamp=local_time(message.error.stamp))
     return _encode(replace(message, **changed)) if changed else body

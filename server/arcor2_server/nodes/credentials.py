@@ -20,7 +20,7 @@ from arcor2_server.settings import is_loopback
 
 
 class MemberKind(StrEnum):
-    """What a member of the account of a broker is."""
+    """The kind of a member of the account of a broker."""
 
     MEMBER = auto()
     """A node, or a cell of the fleet."""
@@ -35,7 +35,7 @@ class Credentials(msgspec.Struct, frozen=True):
 
     url: address, with tls:// unless the broker is on this computer. authority: certificates to trust (PEM); empty for
     those that the system trusts. claim: signed by the server; empty without. seed: private key of this computer.
-    kind: what this computer is for the broker; that of a site connects as a leaf node.
+    kind: kind of member that this computer is; the broker of a site connects as a leaf node.
     """
 
     url: str
@@ -149,7 +149,7 @@ def address_of(url: str) -> str:
 
 
 def check_name(name: str) -> None:
-    """Check a name of a node, or of a cell or site of the fleet. Raise InvalidData if the text is none."""
+    """Check a name of a node, or of a cell or site of the fleet. Raise InvalidData if it is invalid."""
     if not re.fullmatch(NAME, name):
         raise InvalidData("{name!r} is not a valid name: use lower-case letters, digits, - and _.", name=name)
 

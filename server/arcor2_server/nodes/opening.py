@@ -4,7 +4,7 @@ import msgspec
 
 from arcor2_hw.messages import Message
 from arcor2_server.nodes.presence import own_version
-from arcor2_server.nodes.session import SILENCE
+from arcor2_server.nodes.session import SILENCE_TIMEOUT
 
 
 class Opening(msgspec.Struct, frozen=True):
@@ -15,7 +15,7 @@ class Opening(msgspec.Struct, frozen=True):
 
     session: str
     version: str
-    silence: float = SILENCE
+    silence: float = SILENCE_TIMEOUT
 
 
 class Opened(msgspec.Struct, frozen=True):

@@ -34,9 +34,9 @@ from arcor2_server.nodes.presence import own_version
 
 PORT: Final = 4223
 """Default port of the server for pairing."""
-VALID: Final = 600.0
+CODE_VALIDITY: Final = 600.0
 """Time for which a code is valid, s."""
-ATTEMPTS: Final = 3
+MAX_ATTEMPTS: Final = 3
 """Number of wrong codes after which the code is no longer valid."""
 MESSAGE_TIMEOUT: Final = 10.0
 """Time limit for a message of the peer, s."""
@@ -49,7 +49,7 @@ CODE_SIZE: Final = 8
 _COST: Final = 1 << 16
 """Cost of a guess (scrypt): 64 MiB and some 0.2 s. Trying all codes takes 7,000 years of processor time."""
 _MEMORY: Final = 1 << 27
-_LARGEST: Final = 64 * 1024
+_MAX_MESSAGE_SIZE: Final = 64 * 1024
 """Maximum size of a message, bytes."""
 
 
@@ -96,7 +96,7 @@ class Invitation:
         self,
         name: str,
         accept: Callable[[str, str], Credentials],
-        valid: float = VALID,
+        valid: float = CODE_VALIDITY,
         *,
         same_version: bool = True,
     ) -> None:
@@ -121,12 +121,12 @@ class Invitation:
         """
         context, self._certificate = _server_context()
         server = await asyncio.start_server(
-            self._serve, host, port, ssl=context, limit=_LARGEST, ssl_handshake_timeout=MESSAGE_TIMEOUT
+            self._serve, host, port, ssl=context, limit=_MAX_MESSAGE_SIZE, ssl_handshake_timeout=MESSAGE_TIMEOUT
         )
         async with server:
             yield server.sockets[0].getsockname()[1]
 
-    async def accepted(self) -> str:
+    async def wait_accepted(self) -> str:
         """Wait for the node; return its public key.
 
         Raises:
@@ -158,7 +158,7 @@ class Invitation:
         else:
             self._wrong += 1
             wrong = Refused("A wrong code was entered {count} times. Start again.", count=self._wrong)
-            answer, outcome = Answer(own_version()), wrong if self._wrong >= ATTEMPTS else None
+            answer, outcome = Answer(own_version()), wrong if self._wrong >= MAX_ATTEMPTS else None
         content = msgspec.json.encode(answer)
         writer.write(_joined(_proof(key, b"server", body + content), content))
         await _close(writer)  # the answer is sent before the command ends
@@ -207,10 +207,10 @@ async def pair(
     address = f"{host}:{port}"
     try:
         async with asyncio.timeout(MESSAGE_TIMEOUT):
-            reader, writer = await asyncio.open_connection(host, port, ssl=_client_context(), limit=_LARGEST)
+            reader, writer = await asyncio.open_connection(host, port, ssl=_client_context(), limit=_MAX_MESSAGE_SIZE)
         try:
             certificate = writer.get_extra_info("ssl_object").getpeercert(binary_form=True)
-            secret = await asyncio.to_thread(_proof_key, _plain(code), request.salt, certificate)
+            secret = await asyncio.to_thread(_proof_key, _normalised_code(code), request.salt, certificate)
             writer.write(_joined(_proof(secret, b"node", body), body))
             async with asyncio.timeout(MESSAGE_TIMEOUT):
                 proof, content = _split(await reader.readuntil())
@@ -236,7 +236,7 @@ async def pair(
 
 
 # -------------------------------------------------------------------------------------------------------- both
-def _plain(code: str) -> str:
+def _normalised_code(code: str) -> str:
     """Return a code as typed in the form of `new_code`."""
     code = "".join(code.split()).replace("-", "").upper()
     return f"{code[: CODE_SIZE // 2]}-{code[CODE_SIZE // 2 :]}"

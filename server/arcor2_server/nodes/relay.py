@@ -31,7 +31,7 @@ from arcor2_server.nodes.lanes import Header, Lane
 from arcor2_server.nodes.opening import Opened, Opening
 from arcor2_server.nodes.presence import own_version
 from arcor2_server.nodes.run_records import INTERCEPTED, RunRecords
-from arcor2_server.nodes.session import SILENCE, Connections, SessionEnd
+from arcor2_server.nodes.session import SILENCE_TIMEOUT, Connections, SessionEnd
 from arcor2_server.nodes.stream import MessageStream
 
 OPEN_TIMEOUT: Final = 3.0
@@ -92,7 +92,7 @@ class Relay:
         opening = Opening(secrets.token_hex(8), own_version(), silence)
         subject = broker.session_subject(self._node, opening.session)
         end = self._end = SessionEnd(connections, subject, "server", "node", self._name, self, silence)
-        self._records = RunRecords(self._ring, lambda body: end.send(Lane.CALLS, body), end.here)
+        self._records = RunRecords(self._ring, lambda body: end.send(Lane.CALLS, body), end.local_time)
         try:
             await end.open()
             answer = await connections[Lane.CALLS].request(
@@ -152,7 +152,7 @@ class Relay:
             return
         if kind == "ProgramChanged":
             self._records.program_changed(m.decode_server_bound(body))
-        self._stream.send(for_server(kind, body, self._end.here))
+        self._stream.send(for_server(kind, body, self._end.local_time))
 
     # -------------------------------------------------------------------------------- end
     def ended(self, reason: Message, by_peer: bool) -> None:  # noqa: ARG002
@@ -194,7 +194,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Pass messages to a node on. The server starts this process.")
     parser.add_argument("--fd", type=int, required=True, help="inherited socket to the server")
     parser.add_argument("--node", required=True, help="name of the node")
-    parser.add_argument("--silence", type=float, default=SILENCE, help="time without a beat until the session ends, s")
+    parser.add_argument(
+        "--silence", type=float, default=SILENCE_TIMEOUT, help="time without a beat until the session ends, s"
+    )
     parser.add_argument("--ring", type=int, help="inherited memory of the ring of recent values")
     options = parser.parse_args()
     with contextlib.suppress(OSError):  # not permitted without LimitNICE in the service file

@@ -1,4 +1,4 @@
-"""What a run on a node records is stored by its relay, as the cell host would store it on the server's computer.
+"""The relay stores what a run on a node records, as the cell host would store it on the server's computer.
 
 Checkpoints and the records of the ring arrive as messages. The ring is the memory that the server has created.
 """
@@ -66,11 +66,13 @@ class RunRecords:
     Args:
         ring: the ring of the server; None if nothing is recorded.
         answer: sends a message to the host.
-        here: converts a time of the node's clock.
+        local_time: converts a time of the node's clock.
     """
 
-    def __init__(self, ring: Ring | None, answer: Callable[[bytes], None], here: Callable[[float], float]) -> None:
-        self._ring, self._answer, self._here = ring, answer, here
+    def __init__(
+        self, ring: Ring | None, answer: Callable[[bytes], None], local_time: Callable[[float], float]
+    ) -> None:
+        self._ring, self._answer, self._local_time = ring, answer, local_time
         self._generation, self._offset = 0, 0.0
         self._run: m.RunPackage | None = None
         self._file: CheckpointFile | None = None
@@ -104,7 +106,7 @@ class RunRecords:
             return
         if message.generation != self._generation:
             self._generation = message.generation
-            self._offset = self._here(0.0)  # one for a segment, so that the order of its records does not change
+            self._offset = self._local_time(0.0)  # one for a segment, so that the order of its records does not change
             self._ring.begin_segment()
         for record in records(message.records):
             self._ring.append(shifted(record, self._offset))

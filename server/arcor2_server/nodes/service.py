@@ -81,7 +81,7 @@ class HostedSession:
         self.id = opening.session
         self._failed = failed
         self._started = time.monotonic()
-        self._runs = ("", "")
+        self._running = ("", "")
         self._store = store
         self._folder = folder
         self.end = SessionEnd(
@@ -106,7 +106,7 @@ class HostedSession:
     @property
     def running(self) -> RunningSession:
         """What runs in this session."""
-        return RunningSession(self.id, *self._runs, time.monotonic() - self._started)
+        return RunningSession(self.id, *self._running, time.monotonic() - self._started)
 
     async def open(self) -> None:
         """Subscribe to the messages of the server."""
@@ -168,9 +168,9 @@ class HostedSession:
         return process
 
     async def _show_alive(self) -> None:
-        """Let the host notice when this service hangs, so that it does not execute anything unobserved.
+        """Send signs of life to the host: it stops when this service hangs, so that nothing is executed unobserved.
 
-        Send what the host has recorded, too.
+        Also send to the relay what the host has recorded.
         """
         alive = _encode(m.Alive(self._limit + BEAT_PERIOD))
         while True:
@@ -218,14 +218,14 @@ class HostedSession:
                 self._refuse(found, refusal)
                 return
         if found.type in ("OpenScene", "RunPackage"):
-            self._runs = _runs(found.type, body)
+            self._running = _started_by(found.type, body)
         if found.type in WITH_FILES:
             try:
                 body = self._store.unpacked(body, self._folder.path)
             except (NotFound, InvalidData) as error:
                 self._fail(error.message)
                 return
-        self._stream.send(for_host(found.type, body, self.end.here))
+        self._stream.send(for_host(found.type, body, self.end.local_time))
 
     def _store_file(self, body: bytes) -> None:
         try:
@@ -240,7 +240,7 @@ class HostedSession:
         self._failing = asyncio.create_task(self.end.finish(reason), name=f"end of session {self.id}")
 
     def _refusal(self, header: Header, found: MessageOutline) -> Arcor2Error | None:
-        """Return why a command must not be executed any more, None if it may be."""
+        """Return why a command must not be executed any more, None if it may be executed."""
         stopped = max(self._stopped.get("", 0), self._stopped.get(found.object_id, 0))
         if header.number < stopped:
             return Cancelled("The command was stopped before it reached the node.")
@@ -279,7 +279,7 @@ class _Run(msgspec.Struct, frozen=True):
     package_id: str = ""
 
 
-def _runs(kind: str, body: bytes) -> tuple[str, str]:
+def _started_by(kind: str, body: bytes) -> tuple[str, str]:
     """Return the kind and name of the scene or program that a message starts."""
     run = msgspec.msgpack.decode(body, type=_Run)
     return ("scene", run.scene.name) if kind == "OpenScene" else ("program", run.package_id)
@@ -290,7 +290,7 @@ class NodeService:
 
     Args:
         name: name of the node.
-        credentials: returns those for the broker; called before each attempt to connect.
+        credentials: returns the credentials for the broker; called before each attempt to connect.
         sessions: directory for the files of sessions.
         environment: the environment of cell hosts.
         ready: called each time when the node can be used.

@@ -20,7 +20,7 @@ from arcor2_server.nodes.session_clock import SessionClock
 
 BEAT_PERIOD: Final = 0.1
 """Period of the beats in both directions, s."""
-SILENCE: Final = 0.35
+SILENCE_TIMEOUT: Final = 0.35
 """Time without a beat after which a session ends, s: motion stops within 0.5 s after a cut."""
 CHECK_PERIOD: Final = 0.02
 """Period of the check for silence, s."""
@@ -34,7 +34,7 @@ FILES_TIMEOUT: Final = 5.0
 """Time limit for the peer to answer which files it lacks, s."""
 FILES_PERIOD: Final = 0.05
 """Period of these requests while files are being sent, s."""
-SUSPENDED: Final = 0.2
+MAX_SUSPENSION: Final = 0.2
 """Growth of the difference between the clocks with and without suspension that ends a session, s."""
 _BEAT: Final = struct.Struct("<ddd")
 _reason = msgspec.msgpack.Decoder(Message).decode
@@ -74,7 +74,7 @@ class SessionEnd:
         theirs: str,
         peer: Message,
         handler: Handler,
-        silence: float = SILENCE,
+        silence: float = SILENCE_TIMEOUT,
     ) -> None:
         self.clock = SessionClock()
         self._connections = connections
@@ -91,7 +91,7 @@ class SessionEnd:
         self._beat_at = 0.0
         self._beat = (0.0, 0.0)
         """When the peer sent the last beat, on its clock, and when it arrived, on ours."""
-        self._awake = _suspension()
+        self._suspended_at_start = _suspension()
         self._synchronised = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
         self._subscriptions: list[Any] = []
@@ -101,8 +101,8 @@ class SessionEnd:
     async def open(self) -> None:
         """Subscribe, and start to send beats. The peer has to send its first one within the silence limit."""
         for lane in Lane:
-            await self._subscribe(lane, f"{self._in}.{lane}", self._part(lane))
-        await self._subscribe(Lane.STOP, f"{self._in}.beat", self._beaten)
+            await self._subscribe(lane, f"{self._in}.{lane}", self._receiver(lane))
+        await self._subscribe(Lane.STOP, f"{self._in}.beat", self._beat_received)
         await self._subscribe(Lane.FRAMES, f"{self._in}.confirmed", self._confirmed)
         for client in self._connections.values():
             await confirm_sent(client)
@@ -246,7 +246,7 @@ class SessionEnd:
             self.connection_lost()
 
     # -------------------------------------------------------------------------------- receiving
-    def _part(self, lane: Lane) -> Callable[[Msg], Awaitable[None]]:
+    def _receiver(self, lane: Lane) -> Callable[[Msg], Awaitable[None]]:
         reader = self._readers[lane]
 
         async def receive(message: Msg) -> None:
@@ -275,7 +275,7 @@ class SessionEnd:
     async def _confirmed(self, _: Msg) -> None:
         self._unconfirmed.release()
 
-    async def _beaten(self, message: Msg) -> None:
+    async def _beat_received(self, message: Msg) -> None:
         now = time.monotonic()
         sent, echoed, arrived = _BEAT.unpack(message.data)
         self._beat, self._beat_at = (sent, now), now
@@ -283,13 +283,13 @@ class SessionEnd:
             self.clock.exchanged(echoed, arrived, now)
             self._synchronised.set()
 
-    def here(self, moment: float) -> float:
+    def local_time(self, moment: float) -> float:
         """Return the earliest possible time on this computer's clock of a time of the peer's clock, s."""
         return self.clock.earliest(moment, time.monotonic())
 
     def age(self, header: Header) -> float:
         """Return the largest possible age of a message, s."""
-        return time.monotonic() - self.here(header.sent)
+        return time.monotonic() - self.local_time(header.sent)
 
     # -------------------------------------------------------------------------------- loss
     def connection_lost(self) -> None:
@@ -305,7 +305,7 @@ class SessionEnd:
             silent = now - self._beat_at > self._silence
             # After a delay of this process, beats that wait in the socket are read first, once.
             wait, waited = silent and late and not waited, silent
-            if _suspension() - self._awake > SUSPENDED:
+            if _suspension() - self._suspended_at_start > MAX_SUSPENSION:
                 self.end(Message.of("the connection to {peer} was lost: this computer was suspended", peer=self._peer))
             elif silent and not wait:
                 self.end(

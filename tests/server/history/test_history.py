@@ -74,7 +74,7 @@ def values_of(recorder: PointRecorder) -> list[tuple[str, int, Any, str]]:
 def test_changes_beyond_the_dead_band_are_recorded_with_the_time_of_their_source() -> None:
     recorder = PointRecorder(0.1, [DeadBand.parse("oven.temp*=0.5"), DeadBand.parse("*=0")])
     for at, temperature, door in ((1000, 20.0, False), (2000, 20.5, True), (3000, 20.6, True), (4000, 20.1, True)):
-        recorder.reported("obj", "oven", [point("temperature", temperature, age=0.25), point("door", door)], at)
+        recorder.device_reported("obj", "oven", [point("temperature", temperature, age=0.25), point("door", door)], at)
     assert values_of(recorder) == [
         ("temperature", 750, 20.0, "good"),
         ("door", 1000, 0.0, "good"),
@@ -108,17 +108,17 @@ def test_the_error_names_an_invalid_setting(name: str, value: str) -> None:
 def test_a_change_that_lasts_is_recorded_when_the_interval_is_over() -> None:
     recorder = PointRecorder(1.0)
     for at, value in ((0, 1.0), (500, 2.0), (600, 3.0), (1100, 3.0)):
-        recorder.reported("obj", "oven", [point("p", value)], at)
+        recorder.device_reported("obj", "oven", [point("p", value)], at)
     assert values_of(recorder) == [("p", 0, 1.0, "good"), ("p", 1100, 3.0, "good")]
 
 
 def test_a_lost_value_is_recorded_at_once_and_an_unchanged_one_every_ten_minutes() -> None:
     recorder = PointRecorder(60.0)
-    recorder.reported("obj", "oven", [point("p", 1.0), point("code", "=abc")], 0)
-    recorder.reported("obj", "oven", [point("p", 1.0, PointQuality.BAD), point("code", "=abc")], 10)
-    recorder.reported("obj", "oven", [point("code", "=abc")], 600_000)
-    recorder.gone("obj", 600_001)
-    recorder.gone("obj", 600_002)
+    recorder.device_reported("obj", "oven", [point("p", 1.0), point("code", "=abc")], 0)
+    recorder.device_reported("obj", "oven", [point("p", 1.0, PointQuality.BAD), point("code", "=abc")], 10)
+    recorder.device_reported("obj", "oven", [point("code", "=abc")], 600_000)
+    recorder.device_removed("obj", 600_001)
+    recorder.device_removed("obj", 600_002)
     assert values_of(recorder) == [
         ("p", 0, 1.0, "good"),
         ("code", 0, "=abc", "good"),
@@ -133,11 +133,11 @@ def test_the_memory_of_the_recorder_is_bounded(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("arcor2_server.history.recorder.MAX_POINTS", 2)
     recorder = PointRecorder(0.1)
     for at in range(500):
-        recorder.reported("obj", "oven", [point("a", float(at)), point("b", 1.0), point("c", 1.0)], at * 1000)
+        recorder.device_reported("obj", "oven", [point("a", float(at)), point("b", 1.0), point("c", 1.0)], at * 1000)
     values = recorder.take()
     assert len(values) <= 100
     assert recorder.dropped == 501 - len(values)
-    recorder.reported("obj", "oven", [point("a", -1.0)], 500_000)
+    recorder.device_reported("obj", "oven", [point("a", -1.0)], 500_000)
     recorder.put_back([*values, *values])
     assert len(recorder.take()) == 100
 

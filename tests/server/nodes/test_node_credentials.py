@@ -253,7 +253,7 @@ async def test_a_code_is_valid_once() -> None:
         with pytest.raises(Refused, match=f"This code is for {NODE}"):
             await offer.pair(offer.invitation.code, name="oven")
         found = await offer.pair(offer.invitation.code)
-        key = await offer.invitation.accepted()
+        key = await offer.invitation.wait_accepted()
         assert (found.claim, SigningKey.from_seed(found.seed).public) == ("claim", key)
         with pytest.raises(ConnectionLost):
             await offer.pair(offer.invitation.code)
@@ -263,16 +263,16 @@ async def test_a_code_is_valid_once() -> None:
 @pytest.mark.usefixtures("cheap_keys")
 async def test_a_code_is_void_after_wrong_ones_and_when_it_expires() -> None:
     async with offered() as offer:
-        for _ in range(pairing.ATTEMPTS):
+        for _ in range(pairing.MAX_ATTEMPTS):
             with pytest.raises(Refused):
                 await offer.pair("WRNG-CDEE")
         with pytest.raises(Refused, match="3 times"):
-            await offer.invitation.accepted()
+            await offer.invitation.wait_accepted()
         with pytest.raises(ConnectionLost):
             await offer.pair(offer.invitation.code)
     async with offered(valid=0.01) as late:
         with pytest.raises(Refused, match="expired"):
-            await late.invitation.accepted()
+            await late.invitation.wait_accepted()
         with pytest.raises(ConnectionLost):
             await late.pair(late.invitation.code)
     assert offer.accepted == late.accepted == []
