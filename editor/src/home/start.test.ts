@@ -13,7 +13,7 @@ const entry = (id: string, modified = "", problems: string[] = []) => ({
   problems,
 });
 
-test("home proposes what the user opened last, then the newest project, then a new one", () => {
+test("home proposes the document that the user opened last, then the newest project, then a new one", () => {
   const { lists } = initialState();
   expect(proposalOf(lists, [])).toBeNull();
   expect(proposalOf({ ...lists, scenes: [], projects: [] }, [])).toEqual({ kind: "empty" });

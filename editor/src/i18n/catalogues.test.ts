@@ -27,7 +27,7 @@ test("every language has a catalogue, and every catalogue a language", () => {
 });
 
 describe.each(Object.keys(LANGUAGES))("the catalogue %s", (language) => {
-  test("is complete, and its texts have the fields and the last mark of the originals", async () => {
+  test("is complete, and its texts have the placeholders and the final punctuation of the originals", async () => {
     const texts = await textsOf(language);
     expect(texts.length).toBeGreaterThan(800);
     const wrong = texts.filter(

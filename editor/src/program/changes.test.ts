@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { Changes } from "./changes";
 
-test("a change before the answer to the former builds on it, a later one on what is stored", async () => {
+test("a change before the answer to the previous one builds on it, a later change on the stored value", async () => {
   const changes = new Changes<string>();
   const sent: string[] = [];
   const answers: (() => void)[] = [];

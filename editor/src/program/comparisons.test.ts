@@ -60,7 +60,7 @@ test("own results come first, then earlier ones and variables", () => {
   expect(operandsOf(doc, TYPES, "a").map((each) => each.name)).toEqual(["a_result", "so_many"]);
 });
 
-test("a result that equals a value is sent as a condition of all clients", () => {
+test("the comparison of a result with an equal value is sent as `condition`, which all clients know", () => {
   const { doc } = comparing(all());
   const none = all();
   expect(fieldsOf(doc, TYPES, all(compared(N, "==", "3")))).toEqual({ condition: { what: N, value: "3" }, when: none });
@@ -121,7 +121,7 @@ test("problems name incomplete comparisons and missing values", () => {
   expect(usersOf(comparing(all(compared("par", "<", "3"))).doc, TYPES, { parameter: "par" })).toEqual(["s2"]);
 });
 
-test("next to comparisons, a further connection is for all other values", () => {
+test("after connections with comparisons, a further connection is for all other values", () => {
   const { doc } = comparing(all(compared(N, "<", "3")), all(compared(N, ">", "3")));
   expect(freeStep(doc, TYPES, "b")).toEqual({});
 });
@@ -136,7 +136,7 @@ test("a result that is stored in a variable is used as the variable", () => {
   expect(usersOf(doc, TYPES, { parameter: "par" })).toEqual(["a"]);
 });
 
-test("what Build refuses about comparisons of two values is known while editing", () => {
+test("comparisons of two values that Build refuses are reported while editing", () => {
   const pair = (operator: Operator, other = "par"): LogicComparison => ({ what: N, operator, value: "", other });
   const texts = (first: LogicWhen, second?: LogicWhen) =>
     branchProblems(comparing(first, second).doc, TYPES, "b").map(({ id, text }) => `${id}: ${text}`);

@@ -68,7 +68,7 @@ const event = (change_type: string, data: ProjectFunction) =>
   ({ event: "FunctionChanged", change_type, data }) as ServerEvent;
 
 describe("the open function", () => {
-  it("replaces the program in the document and gives it back", () => {
+  it("replaces the program in the document, and restores it when it is closed", () => {
     const doc = withFunction();
     const open = inScope(doc, ["pfu"]);
     expect(Object.keys(open.actions)).toEqual(["feed", "look"]);
@@ -162,7 +162,7 @@ describe("selecting a run of actions", () => {
     ["e", "END"],
   ]);
 
-  it("adds what is between the first and the last one, in any order", () => {
+  it("adds the actions between the first and the last one, in any order", () => {
     expect(picked(doc, [], "a")).toEqual(["a"]);
     expect(picked(doc, ["a"], "d")).toEqual(["a", "b", "c", "d"]);
     expect(picked(doc, ["d"], "a")).toEqual(["a", "b", "c", "d"]);

@@ -21,7 +21,7 @@ function enter(user: string) {
   return client;
 }
 
-test("a server that does not answer in time while a user joins is asked again", async () => {
+test("joining sends a request again if the server does not answer it in time", async () => {
   call.mockImplementation((request: string) =>
     request === "SubscribeEvents"
       ? Promise.reject(new DeadlineExceeded(request, 15))
@@ -33,7 +33,7 @@ test("a server that does not answer in time while a user joins is asked again", 
   expect(client.stop, "the user has not been refused").not.toHaveBeenCalled();
 });
 
-test("what a user sees and changes is never replaced by the stored view state", async () => {
+test("settings that a user sees and changes are never replaced by the stored view state", async () => {
   const answers: ((values: object) => void)[] = [];
   call.mockImplementation((request: string) => {
     if (request === "GetViewState") return new Promise((resolve) => answers.push((values) => resolve({ values })));
