@@ -89,6 +89,8 @@ class Forker:
         environment: Mapping[str, str] | None = None,
         inherited: Sequence[int] = (),
         name: str = "",
+        directory: Path | None = None,
+        stdin: int | None = None,
     ) -> "Forked | subprocess.Popen[bytes]":
         """Start `python -m MODULE ARGUMENTS` from a process that has imported some modules; standard output is a pipe.
 
@@ -102,6 +104,8 @@ class Forker:
             environment: Environment of the program, by default that of this process.
             inherited: Files for the program. With files, it has a separate session, as children of the server have.
             name: Name in the list of processes. With a name, the program runs as with `python -P`.
+            directory: Working directory, by default that of this process.
+            stdin: File to read as standard input, by default an empty one.
         """
         own = os.environ if environment is None else environment
         fixed = {key: value for key, value in own.items() if key.startswith(BOUND_TO_THE_INTERPRETER)}
@@ -109,25 +113,27 @@ class Forker:
             command = [sys.executable, "-m", module, *arguments]
             return subprocess.Popen(
                 command, stdout=subprocess.PIPE, stderr=stderr, env=own,
-                pass_fds=inherited, start_new_session=bool(inherited),
+                pass_fds=inherited, start_new_session=bool(inherited), cwd=directory, stdin=stdin,
             )  # fmt: skip
         request = {
             "module": module,
             "arguments": list(arguments),
             "imports": list(imports),
             "environment": dict(own),
-            "directory": str(Path.cwd()),
+            "directory": str(directory or Path.cwd()),
             "umask": _umask(),
             "inherited": list(inherited),
             "name": name,
+            "stdin": stdin is not None,
         }
+        files = [*inherited, *([] if stdin is None else [stdin])]
         out, theirs = os.pipe()
         status, reported = os.pipe()
         errors = theirs if stderr == subprocess.STDOUT else stderr if isinstance(stderr, int) else stderr.fileno()
         try:
             with self._lock:
                 connection = self._connect()
-                socket.send_fds(connection, [json.dumps(request).encode()], [theirs, errors, reported, *inherited])
+                socket.send_fds(connection, [json.dumps(request).encode()], [theirs, errors, reported, *files])
                 pid = connection.recv(20)
         finally:
             os.close(theirs)

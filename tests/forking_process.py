@@ -99,6 +99,8 @@ def become(request: dict[str, Any], fds: list[int]) -> NoReturn:
     module, inherited = request["module"], request["inherited"]
     os.dup2(fds[0], 1)
     os.dup2(fds[1], 2)
+    if request["stdin"]:
+        os.dup2(fds.pop(), 0)
     first_kept = max([_LARGEST_FILE, *inherited]) + 1
     kept = [fcntl.fcntl(fd, fcntl.F_DUPFD, first_kept) for fd in fds[3:]]
     os.closerange(3, first_kept)

@@ -1,8 +1,6 @@
 """`pytest --pyargs arcor2_hw.testing --device my_cell.yaml`, as an integrator runs it, without a test file."""
 
 import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,6 +17,7 @@ from arcor2_hw.testing.frames import ModbusTcp
 from arcor2_hw.testing.outcomes import Kind
 from arcor2_hw.testing.report import Report
 from arcor2_hw.testing.tcp_wire import TcpWire
+from tests import commands
 from tests.fakes.conftest import FakeProcess
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -70,17 +69,12 @@ def at(fake: FakeProcess) -> dict[str, object]:
 
 def run(folder: Path, cell: list[dict[str, object]], *arguments: str) -> str:
     (folder / "my_cell.yaml").write_bytes(msgspec.yaml.encode({"devices": cell}))
-    (folder / "pytest.ini").write_text("[pytest]\n")
+    (folder / "pytest.ini").write_text(f"[pytest]\npythonpath = {' '.join(map(str, [folder, *SOURCE_FOLDERS]))}\n")
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "COV_"))}
-    environment |= {
-        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
-        "PYTHONPATH": os.pathsep.join(map(str, [folder, *SOURCE_FOLDERS])),
-    }
-    command = [sys.executable, "-m", "pytest", "-q", "-rs", "-p", "arcor2_hw.testing.plugin", "-p", "no:cacheprovider"]
-    command += ["--pyargs", "arcor2_hw.testing", *(["--device", "my_cell.yaml"] if cell else []), *arguments]
-    ended = subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100, check=False
-    )
+    environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
+    options = ["-q", "-rs", "-p", "arcor2_hw.testing.plugin", "-p", "no:cacheprovider"]
+    options += ["--pyargs", "arcor2_hw.testing", *(["--device", "my_cell.yaml"] if cell else []), *arguments]
+    ended = commands.run(commands.PYTEST, *options, cwd=folder, env=environment)
     return ended.stdout + ended.stderr
 
 

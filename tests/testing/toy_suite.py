@@ -2,10 +2,10 @@
 
 import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from tests import commands
 
 HERE = Path(__file__).parent
 PACKAGE = HERE / "broken"
@@ -56,15 +56,13 @@ def run(
         "pytest.ini": "[pytest]\n",
     }.items():
         (folder / name).write_text(text)
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "arcor2_hw.testing.plugin"]
-    command += ["-rA", *arguments, *(["-k", selected] if selected else [])]
+    options = ["-q", "-p", "no:cacheprovider", "-p", "arcor2_hw.testing.plugin", "-rA", *arguments]
+    options += ["-k", selected] if selected else []
     # Environment variables of the surrounding run must not affect this one. None of the installed plugins is
     # loaded: that of dash, a dependency of Open3D, warns with every pytest, and others take time.
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "COV_"))}
     environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
-    ended = subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=290, check=False
-    )
+    ended = commands.run(commands.PYTEST, *options, cwd=folder, env=environment, timeout=290)
     return ended.stdout + ended.stderr
 
 

@@ -7,7 +7,6 @@ import json
 import ssl
 import stat
 import subprocess
-import sys
 import zipfile
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -28,6 +27,7 @@ from arcor2_server.audit.chain import AuditFile
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.serve import welcome
 from arcor2_server.settings import LegacyListener, ServerSettings
+from tests import commands
 from tests.server.core.serving import COMMAND, RawConnection, ServerProcess, running, talking
 
 
@@ -372,8 +372,7 @@ async def test_legacy_clients_have_a_separate_port(tmp_path: Path) -> None:
 # ------------------------------------------------------------------------------------------------ the command line
 def test_tokens_are_managed_by_the_command_line(tmp_path: Path) -> None:
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "arcor2_server.cli.main", "token", *arguments, "--data-dir", str(tmp_path)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        return commands.run(commands.CLI, "token", *arguments, "--data-dir", tmp_path)
 
     assert "no token" in run("list").stdout
     added = run("add", "line 3", "--role", "technician", "--days", "30")

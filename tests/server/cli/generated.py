@@ -1,9 +1,9 @@
 """Run the tests of a generated driver."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
+
+from tests import commands
 
 
 def run_tests(root: Path, *arguments: str) -> str:
@@ -11,10 +11,8 @@ def run_tests(root: Path, *arguments: str) -> str:
 
     Only the pytest plugin of ARCOR2-HW is loaded, because loading the other plugins takes several seconds.
     """
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "arcor2_hw.testing.plugin", "-p", "no:cacheprovider", "-rs"]
+    options = ("-q", "-p", "arcor2_hw.testing.plugin", "-p", "no:cacheprovider", "-rs")
     environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-    done = subprocess.run(
-        [*command, *arguments], cwd=root, env=environment, capture_output=True, text=True, timeout=200, check=False
-    )
+    done = commands.run(commands.PYTEST, *options, *arguments, cwd=root, env=environment, timeout=200)
     assert done.returncode == 0, done.stdout[-6000:]
     return done.stdout

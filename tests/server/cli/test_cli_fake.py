@@ -13,13 +13,14 @@ import pytest
 
 import arcor2_server.cli.installed_fakes
 from arcor2_server.cli.installed_fakes import InstalledFake, installed_fakes
+from tests import commands
 
 CLI = [sys.executable, "-m", "arcor2_server.cli.main", "fake"]
 FAULTS_OF_EVERY_WIRE = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}
 
 
 def arcor2_hw_fake(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*CLI, *words], capture_output=True, text=True, timeout=60, check=False)
+    return commands.run(commands.CLI, "fake", *words)
 
 
 class Running:

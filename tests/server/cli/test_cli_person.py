@@ -7,14 +7,14 @@ from arcor2_hw.data.role import Role
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.chain import AuditFile
 from arcor2_server.cli.exit_status import ExitStatus
-from tests.server.core.serving import COMMAND, running, talking
+from tests import commands
+from tests.server.core.serving import running, talking
 
 PIN = "973164825091"
 
 
 def person(data: Path, *arguments: str, given: str = "") -> subprocess.CompletedProcess[str]:
-    command = [*COMMAND, "person", *arguments, "--data-dir", str(data)]
-    return subprocess.run(command, input=given, capture_output=True, text=True, timeout=120, check=False)
+    return commands.run(commands.CLI, "person", *arguments, "--data-dir", data, given=given)
 
 
 async def test_persons_are_added_listed_and_removed(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ import asyncio
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from arcor2_hw.data.cell import Cell, CellDevice, read_cell, write_cell
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.parameter import Parameter
 from arcor2_server.cli.main import app
+from tests import commands
 from tests.fakes.conftest import FakeProcess
 from tests.server.core.serving import running
 
@@ -24,14 +24,7 @@ UNREACHABLE = "socket://127.0.0.1:9"
 
 
 def arcor2_hw(*arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-m", "arcor2_server.cli.main", *arguments],
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    return commands.run(commands.CLI, *arguments, env=os.environ | environment)
 
 
 @pytest.fixture(scope="module")

@@ -1,15 +1,13 @@
 """Maps of Modbus devices: each mistake is refused with file, line, keys, value and reason."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.cli.device_map import read_map
+from tests import commands
 
-COMMAND = [sys.executable, "-m", "arcor2_server.cli.main", "device", "new"]
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 MAP = """\
 name: Press
@@ -158,8 +156,7 @@ def test_the_command_refuses_mistakes_in_one_line(tmp_path: Path, arguments: lis
     (tmp_path / "press.yaml").write_text(MAP)
     (tmp_path / "bad.yaml").write_text(MAP.replace("address: 1,", "address: -1,"))
     files = {"MAP": "press.yaml", "BAD": "bad.yaml"}
-    command = [*COMMAND, *(files.get(each, each) for each in arguments)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = commands.run(commands.CLI, "device", "new", *(files.get(each, each) for each in arguments), cwd=tmp_path)
     assert done.returncode == 2
     assert expected in done.stderr
     assert len(done.stderr.splitlines()) == 1

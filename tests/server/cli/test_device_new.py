@@ -11,9 +11,9 @@ from arcor2_hw.data.cell import read_cell
 from arcor2_server.cli.device_new import WIRES, Bus, refusal, texts
 from arcor2_server.cli.main import app
 from arcor2_server.cli.starter_kinds import KINDS, Base
+from tests import commands
 from tests.server.cli.generated import run_tests
 
-COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
 ROOT = Path(__file__).parents[3]
 RUN = list(zip(KINDS, [*WIRES, *WIRES], strict=True))
 """The combinations whose tests run completely with `--matrix`: each base, each bus twice. All others are linted and
@@ -114,12 +114,7 @@ def test_generated_drivers_pass_mypy(tmp_path: Path, pytestconfig: pytest.Config
     ],
 )
 def test_invalid_options_are_refused_in_one_sentence(tmp_path: Path, arguments: list[str], expected: str) -> None:
-    done = subprocess.run(
-        [*COMMAND, "device", "new", *arguments, "--directory", str(tmp_path)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = commands.run(commands.CLI, "device", "new", *arguments, "--directory", tmp_path)
     assert done.returncode == 2
     assert expected in done.stderr
     assert len(done.stderr.splitlines()) == 1
@@ -129,8 +124,8 @@ def test_invalid_options_are_refused_in_one_sentence(tmp_path: Path, arguments: 
 def test_existing_files_are_not_overwritten(tmp_path: Path) -> None:
     generate(tmp_path, Base.GENERIC, Bus.HTTP, "scanner")
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-    again = [*COMMAND, "device", "new", "scanner", "--base", "machine", "--bus", "tcp", "--directory", str(tmp_path)]
-    done = subprocess.run(again, capture_output=True, text=True, check=False)
+    again = ("device", "new", "scanner", "--base", "machine", "--bus", "tcp", "--directory", tmp_path)
+    done = commands.run(commands.CLI, *again)
     assert done.returncode == 2
     assert "already exists" in done.stderr
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before

@@ -4,7 +4,6 @@ import gzip
 import json
 import shutil
 import signal
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -20,6 +19,7 @@ from arcor2_hw.testing import quality, report
 from arcor2_hw.testing.first_day import plan
 from arcor2_hw.testing.outcomes import Kind
 from arcor2_hw.testing.report import DeviceRun, Report
+from tests import commands
 from tests.drivers.universal_robots.conftest import FakeUr
 from tests.fakes.conftest import FakeProcess
 from tests.testing.first_day.operator_at_device import Operator
@@ -327,8 +327,8 @@ def test_the_command_without_a_terminal(tmp_path: Path, arguments: list[str], st
     settings = {"host": "192.0.2.7", "payload_mass": 1.0}
     cell = {"devices": [{"name": "arm", "type": "UR5e", "settings": settings}]}
     (tmp_path / "cell.yaml").write_bytes(msgspec.yaml.encode(cell))
-    command = [sys.executable, "-m", "arcor2_server.cli.main", "device", "check", "cell.yaml", *arguments]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, input="y\n" * 50, timeout=100)
+    words = ("device", "check", "cell.yaml", *arguments)
+    done = commands.run(commands.CLI, *words, cwd=tmp_path, given="y\n" * 50)
     assert (done.returncode, expected in done.stdout + done.stderr) == (status, True), done.stdout + done.stderr
     assert [each.name for each in tmp_path.iterdir()] == ["cell.yaml"]
 
