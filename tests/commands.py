@@ -9,22 +9,38 @@ import tempfile
 import threading
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import IO, Any, Final
 
-from tests.forking import Forker
+from tests.forking import Forked, Forker
 
 CLI: Final = "arcor2_server.cli.main"
 PYTEST: Final = "pytest"
 _PYTEST_PLUGINS: Final = ("assertion.rewrite", "cacheprovider", "fixtures", "junitxml", "python", "terminal", "tmpdir")
 _IMPORTS: Final[Mapping[str, tuple[str, ...]]] = {
-    CLI: (CLI, "arcor2_server.cli.server_connection", "arcor2_server.cli.device_new", "arcor2_server.cli.tables"),
+    CLI: (CLI, "arcor2_server.cli.device_cell", "arcor2_server.cli.device_new"),
     # Without the modules whose assertions pytest rewrites.
     PYTEST: (
         *("pytest", *(f"_pytest.{each}" for each in _PYTEST_PLUGINS), "numpy", "msgspec.yaml", "arcor2_fakes.control"),
         *("arcor2_hw.analysis", "arcor2_hw.objects.polled_control", "arcor2_hw.objects.robot"),
     ),
 }
-_forker: Final = Forker()
+_forkers: Final = {module: Forker() for module in _IMPORTS}
+"""One each, because commands work differently where pytest is imported: Cyclopts warns that it runs in a test."""
+
+
+def start(
+    module: str,
+    *arguments: object,
+    stderr: IO[Any] | int,
+    cwd: Path | None = None,
+    env: Mapping[str, str] | None = None,
+    stdin: int | None = None,
+) -> "Forked | subprocess.Popen[bytes]":
+    """Start `python -m MODULE ARGUMENTS`. The arguments are those of `run` and `Forker.start`."""
+    words = [str(each) for each in arguments]
+    group = [f"arcor2_server.cli.{words[0].replace('-', '_')}"] if module == CLI else []
+    imports = [*_IMPORTS[module], *group]
+    return _forkers[module].start(module, words, imports, stderr, env, directory=cwd, stdin=stdin)
 
 
 def run(
@@ -48,11 +64,10 @@ def run(
     Raises:
         subprocess.TimeoutExpired: It has not ended in time, and was killed.
     """
-    words = [str(each) for each in arguments]
     with tempfile.TemporaryFile("w+") as stdin, tempfile.TemporaryFile("w+") as stderr:
         stdin.write(given)
         stdin.seek(0)
-        process = _forker.start(module, words, _IMPORTS[module], stderr, env, directory=cwd, stdin=stdin.fileno())
+        process = start(module, *arguments, stderr=stderr, cwd=cwd, env=env, stdin=stdin.fileno())
         assert process.stdout is not None
         late = threading.Timer(timeout, process.kill)
         late.start()
@@ -62,6 +77,6 @@ def run(
         late.join()
         status = process.wait()
         if status == -signal.SIGKILL:
-            raise subprocess.TimeoutExpired([module, *words], timeout, output)
+            raise subprocess.TimeoutExpired(module, timeout, output)
         stderr.seek(0)
-        return subprocess.CompletedProcess([module, *words], status, output, stderr.read())
+        return subprocess.CompletedProcess((module, *map(str, arguments)), status, output, stderr.read())

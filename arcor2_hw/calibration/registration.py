@@ -4,11 +4,10 @@ Sources: Y. Chen and G. Medioni, "Object modelling by registration of multiple r
 plane; A. Beaton and J. Tukey (1974) for the weights.
 """
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import open3d as o3d
 from scipy.spatial import cKDTree
 
 from arcor2_hw.calibration.surface import RobotSurface
@@ -97,10 +96,12 @@ class Model:
     """A robot's surface for ray casting, in the base frame. Not thread-safe."""
 
     def __init__(self, surface: RobotSurface) -> None:
+        import open3d as o3d  # it takes a second
+
         self._scene = o3d.t.geometry.RaycastingScene()
         self._scene.add_triangles(
-            o3d.core.Tensor.from_numpy(np.ascontiguousarray(surface.vertices, dtype=np.float32)),
-            o3d.core.Tensor.from_numpy(np.ascontiguousarray(surface.triangles, dtype=np.uint32)),
+            _tensor(np.ascontiguousarray(surface.vertices, dtype=np.float32)),
+            _tensor(np.ascontiguousarray(surface.triangles, dtype=np.uint32)),
         )
 
     def render(self, base_from_camera: Floats, rays: Floats) -> RenderedSurface:
@@ -108,19 +109,25 @@ class Model:
         both = np.empty((len(rays), 6), np.float32)
         both[:, :3] = base_from_camera[:3, 3]
         both[:, 3:] = rays @ base_from_camera[:3, :3].T
-        hit = self._scene.cast_rays(o3d.core.Tensor.from_numpy(both))
+        hit = self._scene.cast_rays(_tensor(both))
         normals: Floats = _towards(hit["primitive_normals"].numpy().astype(np.float64), both[:, 3:])
         return RenderedSurface(hit["t_hit"].numpy().astype(np.float64), normals)
 
     def distance(self, points: Floats) -> Floats:
         """Return the distances of points (n, 3) from the surface, m."""
-        found = self._scene.compute_distance(o3d.core.Tensor.from_numpy(points.astype(np.float32)))
+        found = self._scene.compute_distance(_tensor(points.astype(np.float32)))
         return np.asarray(found.numpy(), dtype=np.float64)
 
     def nearest(self, points: Floats) -> tuple[Floats, Floats]:
         """Return the nearest point of the surface to each point, and its normal."""
-        found = self._scene.compute_closest_points(o3d.core.Tensor.from_numpy(points.astype(np.float32)))
+        found = self._scene.compute_closest_points(_tensor(points.astype(np.float32)))
         return found["points"].numpy().astype(np.float64), found["primitive_normals"].numpy().astype(np.float64)
+
+
+def _tensor(array: npt.NDArray[Any]) -> Any:
+    from open3d.core import Tensor
+
+    return Tensor.from_numpy(array)
 
 
 def _towards(normals: Floats, rays: npt.NDArray[np.float32]) -> Floats:

@@ -1,7 +1,12 @@
-"""Run the tutorials: write their files, run their commands, and compare the output."""
+"""Run the tutorials and how-to pages: write their files, run their commands, and compare the output.
+
+The commands of tutorials are started as a user starts them. Those of how-to pages are forked from a process that has
+imported them, except lines that need a shell.
+"""
 
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -10,6 +15,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from tests import commands as forked
+from tests.forking import Forked
+from tests.server.core.serving import fork_server
 
 DOCS = Path(__file__).parents[2] / "docs"
 ELSEWHERE = ("install", "postgresql")
@@ -22,6 +31,8 @@ TUTORIALS = sorted(
 )
 BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 TIMEOUT = 150  # s, of a command; one runs the conformance suite, on a busy machine for more than a minute
+FORKED = re.compile(r"(?:cd (?P<folder>\w+) && )?(?P<program>arcor2-hw|python -m pytest) (?P<words>[^|<>&;$*]*)")
+MODULES = {"arcor2-hw": forked.CLI, "python -m pytest": forked.PYTEST}
 
 
 def expected(lines: list[str]) -> re.Pattern[str]:
@@ -45,15 +56,25 @@ def commands(text: str) -> Iterator[tuple[str, list[str]]]:
 class Background:
     """A command that keeps running; its output is read until it reports that it is ready."""
 
-    def __init__(self, command: str, wanted: list[str], directory: Path, environment: dict[str, str]) -> None:
-        self.process = subprocess.Popen(
-            ["bash", "-c", f"exec {command}"],
-            cwd=directory,
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
+    def __init__(
+        self, command: str, wanted: list[str], directory: Path, environment: dict[str, str], fork: bool
+    ) -> None:
+        self.process: Forked | subprocess.Popen[bytes]
+        program, *words = shlex.split(command)
+        if not fork or program != "arcor2-hw":
+            self.process = subprocess.Popen(
+                ["bash", "-c", f"exec {command}"],
+                cwd=directory,
+                env=environment,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+            )
+        elif words[0] == "serve":
+            at = words.index("--data-dir")
+            data, options = Path(words[at + 1]), (*words[1:at], *words[at + 2 :])
+            self.process = fork_server(data, *options, stderr=subprocess.STDOUT, environment=environment)
+        else:
+            self.process = forked.start(forked.CLI, *words, cwd=directory, env=environment, stderr=subprocess.STDOUT)
         self.output = ""
         self.ready = threading.Event()
         self.pattern = expected(wanted)
@@ -63,7 +84,7 @@ class Background:
     def read(self) -> None:
         assert self.process.stdout is not None
         for line in self.process.stdout:
-            self.output += line
+            self.output += line.decode()
             if self.pattern.search(self.output):
                 self.ready.set()
         self.ready.set()
@@ -79,8 +100,27 @@ class Background:
         self.thread.join()
 
 
+def run(command: str, directory: Path, environment: dict[str, str], fork: bool) -> "subprocess.CompletedProcess[str]":
+    """Run a command of a page to its end."""
+    if fork and (found := FORKED.fullmatch(command)):
+        module, words = MODULES[found["program"]], shlex.split(found["words"])
+        return forked.run(module, *words, cwd=directory / (found["folder"] or ""), env=environment, timeout=TIMEOUT)
+    return subprocess.run(
+        ["bash", "-c", command],
+        cwd=directory,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+        check=False,
+    )
+
+
 @pytest.mark.parametrize("tutorial", TUTORIALS, ids=lambda path: path.stem)
-def test_commands_of_a_tutorial_print_the_stated_output(tutorial: Path, tmp_path: Path) -> None:
+def test_commands_of_a_tutorial_print_the_stated_output(
+    tutorial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     environment = dict(
         os.environ,
         PATH=f"{Path(sys.executable).parent}:{os.environ['PATH']}",
@@ -90,27 +130,20 @@ def test_commands_of_a_tutorial_print_the_stated_output(tutorial: Path, tmp_path
     )
     background: list[Background] = []
     ran = 0
+    fork = tutorial.parent.name == "how-to"
     try:
         for kind, info, text in BLOCK.findall(tutorial.read_text()):
             if title := re.search(r'title="([\w./-]+)"', info):
                 (tmp_path / title.group(1)).write_text(text)
             elif kind == "console" and "background" in info:
                 for command, printed in commands(text):
-                    started = Background(command, printed, tmp_path, environment)
+                    started = Background(command, printed, tmp_path, environment, fork)
                     background.append(started)
                     assert started.ready.wait(TIMEOUT), f"{command}\n{started.output}"
                     assert started.pattern.search(started.output), f"{command}\n{started.output}"
             elif kind == "console":
                 for command, printed in commands(text):
-                    done = subprocess.run(
-                        ["bash", "-c", command],
-                        cwd=tmp_path,
-                        env=environment,
-                        capture_output=True,
-                        text=True,
-                        timeout=TIMEOUT,
-                        check=False,
-                    )
+                    done = run(command, tmp_path, environment, fork)
                     output = done.stdout + done.stderr
                     assert done.returncode == 0, f"{command}\n{output}"
                     assert expected(printed).search(output), f"{command}\n{output}"

@@ -38,7 +38,7 @@ _analyses: list[bytes] = []
 
 
 def fork_server(
-    data_dir: Path, *arguments: str, stderr: IO[bytes], environment: Mapping[str, str] | None = None
+    data_dir: Path, *arguments: str, stderr: IO[bytes] | int, environment: Mapping[str, str] | None = None
 ) -> Forked | subprocess.Popen[bytes]:
     """Start `arcor2-hw serve` on a data directory, forked from a process that has imported it.
 

@@ -28,7 +28,8 @@ from arcor2_server.nodes.credentials import Credentials, load, node_file, requir
 from arcor2_server.nodes.nkeys import Kind, SigningKey, is_user_key
 from arcor2_server.nodes.presence import own_version
 from arcor2_server.settings import ServerSettings
-from tests.server.nodes.conftest import CLI, NODE, PATIENCE, Connected, Node, Server, followed, paired_by_commands
+from tests import commands
+from tests.server.nodes.conftest import NODE, PATIENCE, Connected, Node, Server, followed, paired_by_commands
 from tests.server.nodes.test_node_hosts import moving, online
 from tests.waiting import wait_for
 
@@ -46,7 +47,7 @@ def server(tmp_path: Path) -> Iterator[Server]:
 
 # ---------------------------------------------------------------------------------------------------- command line
 def command(*words: str, code: str = "") -> "subprocess.CompletedProcess[str]":
-    return subprocess.run([*CLI, "node", *words], input=code, capture_output=True, text=True, check=False)
+    return commands.run(commands.CLI, "node", *words, given=code)
 
 
 def pair_by_command(server: Server, folder: Path) -> str:
@@ -382,5 +383,5 @@ async def test_relay_node_and_server_refuse_a_remote_broker_without_tls(tmp_path
         await host.close()
     environment = os.environ | {BROKER_URL: url}
     for words in (("node", "run", NODE), ("serve", "--data-dir", str(tmp_path)), ("node", "broker", url)):
-        done = subprocess.run([*CLI, *words], env=environment, capture_output=True, text=True, check=False)
+        done = commands.run(commands.CLI, *words, env=environment)
         assert (done.returncode, "on another computer" in done.stderr) == (ExitStatus.USAGE, True), done.stderr

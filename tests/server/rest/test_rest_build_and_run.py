@@ -15,7 +15,8 @@ import pytest
 
 from arcor2_hw.client import Client
 from arcor2_hw.data.base import Unset
-from tests.server.core.serving import COMMAND, RawConnection, ServerProcess, running, talking
+from tests import commands
+from tests.server.core.serving import RawConnection, ServerProcess, running, talking
 from tests.server.rest.asking import granted, refused
 
 COUNT = """
@@ -302,15 +303,10 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
 
 async def package_command(server: ServerProcess, *arguments: str) -> list[str]:
     """Return the output of `arcor2-hw package`, for a terminal that is wide enough."""
-    process = await asyncio.create_subprocess_exec(
-        *(*COMMAND, "package", *arguments, "--url", server.url),
-        stdout=asyncio.subprocess.PIPE,
-        env=os.environ | {"COLUMNS": "400"},
-    )
-    async with asyncio.timeout(30):
-        output, _ = await process.communicate()
-    assert process.returncode == 0
-    return output.decode().splitlines()
+    words = ("package", *arguments, "--url", server.url)
+    done = await asyncio.to_thread(commands.run, commands.CLI, *words, env=os.environ | {"COLUMNS": "400"})
+    assert done.returncode == 0
+    return done.stdout.splitlines()
 
 
 async def test_an_upload_of_a_hundred_megabytes_does_not_block_others(server: ServerProcess) -> None:
