@@ -13,7 +13,6 @@ from arcor2_hw.analysis import (
     alarms,
     extraction,
     installed_types,
-    templates,
     translations,
 )
 from arcor2_hw.analysis.library import NO_DESCRIPTION
@@ -69,7 +68,7 @@ def translation_faults(file: SourceFile) -> list[str]:
     folder = Path(file.path).parent
     if not (folder / translations.FOLDER).is_dir():
         return []
-    return translations.faults(folder, extraction.texts(folder, [file]) | extraction.texts(templates.LIBRARY))
+    return translations.faults(folder, extraction.texts(folder, [file]) | extraction.translated_by_library())
 
 
 def alarm_faults(file: SourceFile) -> list[str]:
@@ -87,7 +86,7 @@ def alarm_faults(file: SourceFile) -> list[str]:
     ]
     if not declared or not (folder / translations.FOLDER).is_dir():
         return wrong  # without reading all sources of the library for its texts, which takes seconds
-    shared = extraction.texts(templates.LIBRARY)
+    shared = extraction.translated_by_library()
     for language in alarms.LANGUAGES:
         path = translations.file_of(folder, language)
         known = translations.read(path) if path.exists() else {}

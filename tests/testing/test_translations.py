@@ -1,11 +1,12 @@
 """Checks of the translations of a driver, and of the templates that they translate."""
 
+import functools
 import json
 from pathlib import Path
 
 import pytest
 
-from arcor2_hw.analysis.extraction import ENGLISH, texts, update
+from arcor2_hw.analysis.extraction import ENGLISH, texts, translated_by_library, update
 from arcor2_hw.analysis.templates import LIBRARY, hard_coded, sources, templates
 from arcor2_hw.analysis.translations import FOLDER, faults, file_of, is_language, read
 from arcor2_hw.testing import declarations
@@ -119,7 +120,7 @@ def test_texts_include_those_of_the_object_type() -> None:
     assert scale.file is not None
     known = texts(Path(scale.folder))
     assert {"Mettler Toledo scale", "tare", "the load is above the weighing range", "remove the load"} <= known
-    assert not known & texts(LIBRARY)
+    assert not known & translated_by_library()
 
 
 def test_extraction_keeps_translations_and_removes_unused_ones(tmp_path: Path) -> None:
@@ -133,10 +134,13 @@ def test_extraction_keeps_translations_and_removes_unused_ones(tmp_path: Path) -
     assert list(content) == sorted(content)
 
 
+_texts = functools.cache(texts)
+
+
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 @pytest.mark.parametrize("language", ["cs", "de"])
 def test_texts_of_the_project_are_translated(folder: Path, language: str) -> None:
     """A fault is fixed by `python -m arcor2_hw.analysis.extraction FOLDER`, and by translating the new texts."""
-    found, known = read(file_of(folder, language)), texts(folder)
+    found, known = read(file_of(folder, language)), _texts(folder)
     assert sorted(known - set(found)) == []
     assert faults(folder, known) == []
