@@ -32,6 +32,18 @@ def start_forked_fake(module: str, arguments: Sequence[str], stderr: IO[Any] | i
     return _forker.start(name, arguments, [f"{name}.__main__", *IMPORTED_LATER.get(module, ())], stderr)
 
 
+def run_fake(module: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
+    """Run a forked fake that ends by itself; return its exit status and output."""
+    with tempfile.TemporaryFile("w+") as stderr:
+        process = start_forked_fake(module, arguments, stderr)
+        assert process.stdout is not None
+        with process.stdout as stdout:
+            output = stdout.read().decode()
+        status = process.wait(END_TIMEOUT)
+        stderr.seek(0)
+        return subprocess.CompletedProcess((module, *arguments), status, output, stderr.read())
+
+
 class FakeProcess:
     """A running fake: `ready` is its ready line, `control` is a client of its control channel."""
 

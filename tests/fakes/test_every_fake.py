@@ -1,7 +1,5 @@
 """Features of every installed fake: wire faults, a power cycle, and a faster pace."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,7 +8,7 @@ import pytest
 from arcor2_fakes.two_axis_robot.servo import Servo
 from arcor2_hw.testing.addresses import own_loopback
 from arcor2_server.cli.installed_fakes import InstalledFake, installed_fakes
-from tests.fakes.conftest import FakeProcess
+from tests.fakes.conftest import FakeProcess, run_fake
 
 FAULTS = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}
 ARGUMENTS = {name: ("--host", own_loopback()) for name in ("ur", "abb_yumi")}
@@ -81,12 +79,9 @@ def test_every_fake_survives_a_power_cycle_and_all_faults(running: tuple[Install
 
 
 def test_fakes_with_durations_can_run_faster() -> None:
-    running = {
-        fake.name: subprocess.Popen([sys.executable, "-m", fake.module, "--help"], stdout=subprocess.PIPE, text=True)
-        for fake in FOUND
-    }
-    offering = {name for name, process in running.items() if "--time-scale" in process.communicate(timeout=60)[0]}
-    assert set(running) - offering == set(NO_PACE) & set(running)
+    names = {fake.name for fake in FOUND}
+    offering = {name for name in names if "--time-scale" in run_fake(name, "--help").stdout}
+    assert names - offering == set(NO_PACE) & names
 
 
 class Clock:

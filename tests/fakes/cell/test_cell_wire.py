@@ -13,6 +13,7 @@ import pytest
 import arcor2_fakes.cell
 from arcor2_fakes.cell.boards import draw_boards
 from arcor2_fakes.control import ControlClient, ControlError, ControlServer
+from tests.fakes.conftest import run_fake
 
 EXAMPLE = str(Path(arcor2_fakes.cell.__file__).with_name("example.json"))
 FEEDER, READER, TESTER = (0.4, -0.3, 0.08), (0.3, 0.0, 0.35), (0.5, 0.15, 0.1)
@@ -225,9 +226,7 @@ def test_invalid_arguments_are_reported_in_one_line(arguments: list[str], says: 
     options = {"--robot": "127.0.0.1:1", "--tester": "127.0.0.1:1", "--reader": "127.0.0.1:1"}
     options |= dict(zip(arguments[::2], arguments[1::2], strict=True))
     line = [part for option in options.items() for part in option]
-    ended = subprocess.run(
-        [sys.executable, "-m", "arcor2_fakes.cell", *line], capture_output=True, text=True, timeout=20, check=False
-    )
+    ended = run_fake("cell", *line)
     assert ended.returncode == (3 if "reached" in says else 2)
     assert len(ended.stderr.splitlines()) == 1
     assert says in ended.stderr

@@ -11,7 +11,7 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
-from tests.fakes.conftest import FakeProcess
+from tests.fakes.conftest import FakeProcess, run_fake
 
 RESET, START, STOP, HOLD, UNHOLD, ABORT, CLEAR = 1, 2, 3, 4, 5, 8, 9
 STOPPED, IDLE, EXECUTE, ABORTED, HELD, COMPLETE = 2, 4, 6, 9, 11, 17
@@ -357,14 +357,10 @@ def test_commands_during_silence_do_not_arrive(tester: Any) -> None:
 
 
 def test_the_fake_ends_on_sigterm_and_reports_errors(start_fake: Callable[..., Any]) -> None:
-    import subprocess
-    import sys
-
     fake = start_fake("functional_tester")
     taken = fake.ready["modbus"].split(":")[1]
-    base = [sys.executable, "-m", "arcor2_fakes.functional_tester"]
     for arguments, status in ((["--port", taken], 1), (["--control", "nowhere"], 2)):
-        ended = subprocess.run([*base, *arguments], capture_output=True, text=True, timeout=20, check=False)
+        ended = run_fake("functional_tester", *arguments)
         assert ended.returncode == status
         assert ended.stderr.startswith("functional_tester: ")
         assert len(ended.stderr.strip().splitlines()) == 1

@@ -12,6 +12,7 @@ import psutil
 import pytest
 
 from arcor2_fakes.control import BlockingControlClient, ControlError, parse_address
+from tests.fakes.conftest import run_fake
 from tests.waiting import wait_for
 
 
@@ -186,9 +187,7 @@ def test_the_fake_ends_at_once_and_cleanly(start_ur, number):
 
 
 def test_a_used_port_is_reported_in_one_line(ur):
-    second = subprocess.run(
-        [sys.executable, "-m", "arcor2_fakes.ur", "--host", ur.host], capture_output=True, text=True, timeout=60
-    )
+    second = run_fake("ur", "--host", ur.host)
     assert second.returncode == 1
     assert second.stdout == ""
     assert len(second.stderr.splitlines()) == 1
@@ -199,9 +198,7 @@ def test_a_used_port_is_reported_in_one_line(ur):
     "options", [["--model", "ur99"], ["--controller-version", "x"], ["--control", "nowhere"], ["--frequency", "0"]]
 )
 def test_invalid_options_are_named(options):
-    run = subprocess.run(
-        [sys.executable, "-m", "arcor2_fakes.ur", *options], capture_output=True, text=True, timeout=60
-    )
+    run = run_fake("ur", *options)
     assert run.returncode in (1, 2)
     assert options[1] in run.stderr
 
