@@ -9,16 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import schemathesis
 from hypothesis import HealthCheck, given, settings, strategies as st
-from schemathesis import GenerationMode
-from schemathesis.checks import not_a_server_error
-from schemathesis.specs.openapi.checks import (
-    content_type_conformance,
-    negative_data_rejection,
-    response_schema_conformance,
-    status_code_conformance,
-)
 
 from arcor2_server.app import create_app, running_server
 from arcor2_server.rest import OPERATIONS
@@ -90,26 +81,35 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loop]:
 
 @pytest.fixture(scope="module")
 def api(server: Loop) -> Any:
+    import schemathesis  # not by each worker that collects the tests
+
     return schemathesis.openapi.from_asgi("/openapi", server)
 
 
-CHECKS = [
-    content_type_conformance,
-    negative_data_rejection,
-    not_a_server_error,
-    response_schema_conformance,
-    status_code_conformance,
-]
+@pytest.fixture(scope="module")
+def checks() -> list[Any]:
+    from schemathesis.checks import not_a_server_error
+    from schemathesis.specs.openapi import checks
+
+    return [
+        checks.content_type_conformance,
+        checks.negative_data_rejection,
+        not_a_server_error,
+        checks.response_schema_conformance,
+        checks.status_code_conformance,
+    ]
 
 
 @pytest.mark.parametrize("declared", OPERATIONS, ids=lambda one: f"{one.method} {one.path}")
-def test_every_response_matches_its_schema(api: Any, declared: Operation) -> None:
+def test_every_response_matches_its_schema(api: Any, checks: list[Any], declared: Operation) -> None:
+    from schemathesis import GenerationMode
+
     operation = api[declared.path][declared.method]
 
     @settings(max_examples=EXAMPLES, deadline=None, database=None, derandomize=True, suppress_health_check=HealthCheck)
     @given(st.one_of([operation.as_strategy(mode) for mode in GenerationMode]))
     def ask(case: Any) -> None:
-        answer = case.call_and_validate(checks=CHECKS)
+        answer = case.call_and_validate(checks=checks)
         if answer.status_code >= 400:
             assert set(answer.json()) - TRANSLATION == {"service", "message", "type", "description"}
 
