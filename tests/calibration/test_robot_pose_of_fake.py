@@ -11,9 +11,7 @@ import arcor2_drivers.universal_robots
 from arcor2_fakes.cell import arm
 from arcor2_fakes.cell.layout import Pose as Place
 from arcor2_fakes.oak_d.optics import Lens
-from arcor2_fakes.oak_d.render import Renderer
 from arcor2_fakes.oak_d.scene import Pose as Look, Thing
-from arcor2_fakes.oak_d.sensor import Sensor
 from arcor2_hw.calibration.robot_pose import find_robot_pose
 from arcor2_hw.calibration.surface import surface_of
 from arcor2_hw.data.camera import CameraParameters
@@ -38,6 +36,9 @@ def joints(model: RobotModel) -> list[Joint]:
 
 
 def test_the_arm_is_found_where_the_layout_places_it() -> None:
+    from arcor2_fakes.oak_d.render import Renderer  # loads Open3D, which takes a second
+    from arcor2_fakes.oak_d.sensor import Sensor
+
     name = "ur5e"
     lens = Lens(640, 360)
     seen = arm.things(name, BASE.matrix(), Q, TIP.matrix()).values()

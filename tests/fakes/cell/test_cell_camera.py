@@ -13,7 +13,6 @@ import pytest
 import arcor2_fakes.cell
 from arcor2_fakes.cell.layout import from_rotation_vector
 from arcor2_fakes.oak_d.optics import Lens
-from arcor2_fakes.oak_d.render import Renderer
 from arcor2_fakes.oak_d.scene import Pose as Look, Scene
 
 EXAMPLE = json.loads(Path(arcor2_fakes.cell.__file__).with_name("example.json").read_text())
@@ -69,6 +68,8 @@ def test_the_camera_sees_the_arm_follow_its_joints_and_the_markers(cell: tuple[A
     assert first is not None
     assert second is not None
     assert np.linalg.norm(second - first) > 0.1
+
+    from arcor2_fakes.oak_d.render import Renderer  # loads Open3D, which takes a second
 
     truth = world.truth()
     assert [marker["id"] for marker in truth["markers"]] == [10, 11]
