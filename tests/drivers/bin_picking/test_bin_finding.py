@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from arcor2_drivers.bin_picking import finder
 from arcor2_drivers.bin_picking.bin import Bin
 from arcor2_drivers.bin_picking.errors import BadFit, Empty, PartsTouch
 from arcor2_hw.actions.json_values import decode_picture, encode
@@ -174,6 +173,8 @@ def test_invalid_pictures_are_refused(picture: Photographer, make: Callable[...,
 
 
 def test_stop_ends_a_search(picture: Photographer, make: Callable[..., Bin], monkeypatch: pytest.MonkeyPatch) -> None:
+    from arcor2_drivers.bin_picking import finder  # loads Open3D, which takes a second
+
     bin_ = make()
     register = finder.register
 
