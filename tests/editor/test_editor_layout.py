@@ -1,4 +1,4 @@
-"""Layout of every screen, light and dark, with large text, with a wide font, and in two sizes with a narrow font.
+"""Layout of every screen, light and dark, with large text and with a wide font; with `--matrix` also a narrow font.
 
 No control may be too small, covered, off the screen or overlapping on a phone and on a tablet in both orientations, and
 with `--matrix` in all sizes. Accessibility violations (axe) are checked in one size, alternately in light and dark.
@@ -19,21 +19,38 @@ from tests.editor.screen import FONTS, SERVER_GONE, VIEWPORTS, Screen, screen_of
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
-@pytest_asyncio.fixture(loop_scope="session")
-async def project(cell: Cell) -> AsyncIterator[Project]:
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def project(module_cell: Cell) -> AsyncIterator[Project]:
     """The project of three devices, saved and closed."""
-    client = await cell.client("colleague")
-    _, project = await cell.open(client)
+    client = await module_cell.client("colleague")
+    _, project = await module_cell.open(client)
     await client.call("CloseProject")
     yield project
 
 
-FEW = ("phone", "tablet")
-"""Sizes for screens that differ only in their panel: a sheet at the bottom or at the side."""
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def opened(module_cell: Cell, project: Project, browser: Browser) -> AsyncIterator[Screen]:
+    """The project open on a tablet, which several tests use after each other."""
+    async with screen_of(browser, module_cell.url, touch=True) as screen:
+        screen.expected_errors = SERVER_GONE
+        await join_and_open(screen, "Adam", project)
+        yield screen
+
+
+FEW = ("tablet", "phone")
+"""Sizes for screens that differ only in their panel: at the side or a sheet at the bottom."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def narrow_font(pytestconfig: pytest.Config) -> None:
+    ScreenFaults.narrow = pytestconfig.getoption("--matrix")
 
 
 class ScreenFaults:
     """Collects the layout faults of each screen, alternately in dark and light colours."""
+
+    narrow = False
+    """Whether the narrow font is used, too."""
 
     def __init__(self, screen: Screen, *, dark: bool = True) -> None:
         self.screen = screen
@@ -45,7 +62,10 @@ class ScreenFaults:
         page = self.screen.page
         self._dark = not self._dark
         await page.emulate_media(color_scheme="dark" if self._dark else "light")
-        for font, in_sizes in {"wide": list(sizes), "narrow": [each for each in sizes if each in FEW]}.items():
+        few = [each for each in sizes if each in FEW] if self.narrow else []
+        for font, in_sizes in {"wide": list(sizes), "narrow": few}.items():
+            if not in_sizes:
+                continue
             await self.screen.use_font(font)
             for name in in_sizes:
                 await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
@@ -88,10 +108,16 @@ async def open_tool(screen: Screen, name: str) -> None:
     await screen.page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
 
 
+async def go_online(screen: Screen) -> None:
+    if await screen.page.get_by_role("button", name=texts.GO_ONLINE).is_visible():
+        await screen.press(texts.GO_ONLINE)
+    await screen.page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
+
+
 async def test_join_and_home_screens_have_no_layout_faults(
-    cell: Cell, project: Project, browser: Browser, sizes: list[str]
+    module_cell: Cell, project: Project, browser: Browser, sizes: list[str]
 ) -> None:
-    async with screen_of(browser, cell.url, touch=True) as screen:
+    async with screen_of(browser, module_cell.url, touch=True) as screen:
         found = ScreenFaults(screen)
         page = screen.page
         await page.goto(f"{screen.url}/?q=low")
@@ -117,32 +143,30 @@ async def test_join_and_home_screens_have_no_layout_faults(
 
 
 @asynccontextmanager
-async def project_on_tablet(
-    cell: Cell, project: Project, browser: Browser, *, dark: bool
-) -> AsyncIterator[tuple[Screen, ScreenFaults]]:
-    """Open the project on a tablet. `dark`: colours of the first screen. Fails at the end if the layout had faults."""
-    async with screen_of(browser, cell.url, touch=True) as screen:
-        await join_and_open(screen, "Adam", project)
-        found = ScreenFaults(screen, dark=dark)
-        yield screen, found
-        assert not found.faults, found.report()
+async def on_tablet(screen: Screen, *, dark: bool) -> AsyncIterator[tuple[Screen, ScreenFaults]]:
+    """Close all panels. `dark`: colours of the first screen. Fails at the end if the layout had faults."""
+    await screen.page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
+    await screen.close_panels()
+    found = ScreenFaults(screen, dark=dark)
+    yield screen, found
+    assert not found.faults, found.report()
 
 
-async def test_workplace_has_no_layout_faults(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
-    async with project_on_tablet(cell, project, browser, dark=True) as (_, found):
+async def test_workplace_has_no_layout_faults(opened: Screen, sizes: list[str]) -> None:
+    async with on_tablet(opened, dark=True) as (_, found):
         await found.check("workplace", sizes)
         await found.check_with_large_text("workplace")
 
 
-async def test_tool_panels_have_no_layout_faults(cell: Cell, project: Project, browser: Browser) -> None:
-    async with project_on_tablet(cell, project, browser, dark=False) as (screen, found):
+async def test_tool_panels_have_no_layout_faults(opened: Screen) -> None:
+    async with on_tablet(opened, dark=False) as (screen, found):
         for name in texts.TOOLS:
             await open_tool(screen, name)
             await found.check(name.lower(), FEW)
 
 
-async def test_selection_panels_have_no_layout_faults(cell: Cell, project: Project, browser: Browser) -> None:
-    async with project_on_tablet(cell, project, browser, dark=False) as (screen, found):
+async def test_selection_panels_have_no_layout_faults(opened: Screen, project: Project) -> None:
+    async with on_tablet(opened, dark=False) as (screen, found):
         page = screen.page
         action = project.action_points[0].actions[0].name
         point = project.action_points[0].name
@@ -155,8 +179,8 @@ async def test_selection_panels_have_no_layout_faults(cell: Cell, project: Proje
             await screen.press(texts.CLOSE_PANEL)
 
 
-async def test_search_and_views_have_no_layout_faults(cell: Cell, project: Project, browser: Browser) -> None:
-    async with project_on_tablet(cell, project, browser, dark=False) as (screen, found):
+async def test_search_and_views_have_no_layout_faults(opened: Screen, project: Project) -> None:
+    async with on_tablet(opened, dark=False) as (screen, found):
         page = screen.page
         action = project.action_points[0].actions[0].name
         # Search by name.
@@ -176,24 +200,17 @@ async def test_search_and_views_have_no_layout_faults(cell: Cell, project: Proje
             await found.check(f"shown as {name}", FEW)
 
 
-async def test_online_workplace_has_no_layout_faults(
-    cell: Cell, project: Project, browser: Browser, sizes: list[str]
-) -> None:
-    async with project_on_tablet(cell, project, browser, dark=False) as (screen, found):
-        page = screen.page
-        await screen.press(texts.GO_ONLINE)
-        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
+async def test_online_workplace_has_no_layout_faults(opened: Screen, sizes: list[str]) -> None:
+    async with on_tablet(opened, dark=False) as (screen, found):
+        await go_online(screen)
         await open_tool(screen, texts.ROBOT)
         await found.check("online", sizes)
 
 
-async def test_left_handed_controls_have_no_layout_faults(
-    cell: Cell, project: Project, browser: Browser, sizes: list[str]
-) -> None:
-    async with project_on_tablet(cell, project, browser, dark=True) as (screen, found):
+async def test_left_handed_controls_have_no_layout_faults(opened: Screen, sizes: list[str]) -> None:
+    async with on_tablet(opened, dark=True) as (screen, found):
         page = screen.page
-        await screen.press(texts.GO_ONLINE)
-        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
+        await go_online(screen)
         await open_tool(screen, texts.ROBOT)
         await screen.press(texts.SETTINGS)
         await page.get_by_role("menuitem", name="Left-handed controls").click()
@@ -207,8 +224,8 @@ async def test_left_handed_controls_have_no_layout_faults(
         await page.get_by_role("button", name="Views", exact=True).click(trial=True)
 
 
-async def test_reduced_motion_stops_animations(cell: Cell, project: Project, browser: Browser) -> None:
-    async with screen_of(browser, cell.url, reduced_motion=True) as screen:
+async def test_reduced_motion_stops_animations(module_cell: Cell, project: Project, browser: Browser) -> None:
+    async with screen_of(browser, module_cell.url, reduced_motion=True) as screen:
         await join_and_open(screen, "Berta", project)
         await screen.press(texts.OBJECTS)
         # Spinners are exempt.
@@ -218,13 +235,16 @@ async def test_reduced_motion_stops_animations(cell: Cell, project: Project, bro
 
 
 async def test_screen_without_a_server_has_no_layout_faults(
-    cell: Cell, project: Project, browser: Browser, sizes: list[str]
+    module_cell: Cell, project: Project, browser: Browser, sizes: list[str]
 ) -> None:
-    async with screen_of(browser, cell.url, touch=True) as screen:
+    async with screen_of(browser, module_cell.url, touch=True) as screen:
         screen.expected_errors = SERVER_GONE
         await join_and_open(screen, "Cecil", project)
+        if await (offline := screen.page.get_by_role("button", name=texts.GO_OFFLINE)).is_visible():
+            await offline.click()
+            await screen.page.get_by_role("button", name=texts.GO_ONLINE).wait_for()
         await screen.page.wait_for_load_state("networkidle")  # all lazily loaded parts are loaded
-        await cell.kill("server")
+        await module_cell.kill("server")
         await screen.sees(texts.NO_CONNECTION)
         found = ScreenFaults(screen)
         await found.check("lost server", sizes)
