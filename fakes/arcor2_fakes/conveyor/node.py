@@ -14,7 +14,7 @@ from arcor2_fakes.conveyor.hub import Hub
 from arcor2_fakes.conveyor.pdo import Rpdo, Tpdo
 from arcor2_fakes.conveyor.sdo import SdoServer
 
-TICK = 0.0025
+TICK = 0.005
 HELD_UP = 0.05  # s, longest step of the simulation
 BOOT_TIME = 0.03
 _OPERATIONAL, _STOPPED, _PRE_OPERATIONAL = 5, 4, 127
