@@ -38,11 +38,11 @@ class Opened:
         return next(each for each in self.project.action_points if each.name == name)
 
 
-@pytest_asyncio.fixture(loop_scope="session")
-async def opened(cell: Cell) -> AsyncIterator[Opened]:
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def opened(module_cell: Cell) -> AsyncIterator[Opened]:
     """An open project. Each test joins as another user."""
-    client = await cell.client("colleague")
-    yield Opened(cell, client, *await cell.open(client))
+    client = await module_cell.client("colleague")
+    yield Opened(module_cell, client, *await module_cell.open(client))
 
 
 async def _join(screen: Screen, name: str, opened: Opened) -> None:
