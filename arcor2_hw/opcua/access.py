@@ -17,8 +17,8 @@ from asyncua.server.uaprocessor import UaProcessor
 from asyncua.ua.ua_binary import struct_from_binary
 
 from arcor2_hw.opcua.certificates import TrustedClients
-from arcor2_hw.opcua.interest import MonitoredDevices
 from arcor2_hw.opcua.messages import User
+from arcor2_hw.opcua.monitored_devices import MonitoredDevices
 from arcor2_hw.opcua.space import node_id
 
 MIB: Final = 1024 * 1024

@@ -22,7 +22,7 @@ from arcor2_hw.opcua.access import Internal, OpcUaServer, Services, caller
 from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
 from arcor2_hw.opcua.conditions import Conditions
 from arcor2_hw.opcua.devices import Device
-from arcor2_hw.opcua.interest import MonitoredDevices
+from arcor2_hw.opcua.monitored_devices import MonitoredDevices
 from arcor2_hw.opcua.space import Space
 from arcor2_hw.opcua.unit import VENDOR, Unit
 from arcor2_hw.plant.messages import BEAT_PERIOD, STALE_AFTER, DeviceInfo, UnitData, Update

@@ -22,7 +22,17 @@ from arcor2_server.cli.main import app
 from arcor2_server.demo.fakes import free_loopback_address
 from tests import forked_children
 from tests.e2e.harness import scene_state, until
-from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, pose, pose_error, rotated_about_z, visible_things
+from tests.e2e.workplace_with_camera import (
+    CAMERA,
+    MARKERS,
+    ROBOT,
+    SIZE,
+    Q,
+    pose,
+    pose_error,
+    rotated_about_z,
+    visible_things,
+)
 from tests.fakes.conftest import FakeProcess
 from tests.server.core.serving import ServerProcess
 

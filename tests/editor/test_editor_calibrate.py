@@ -21,10 +21,10 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Mesh, ObjectModel
 from arcor2_hw.data.scene import Scene, SceneObject
 from tests.e2e.harness import Cell, scene_state, until
-from tests.e2e.seen_workplace import CAMERA, ROBOT, pose_error
+from tests.e2e.workplace_with_camera import CAMERA, ROBOT, pose_error
 from tests.editor import texts
+from tests.editor.scene_with_camera import camera_of, configure_markers, new_scene
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
-from tests.editor.seen_scene import camera_of, configure_markers, new_scene
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 

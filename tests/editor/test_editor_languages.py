@@ -28,8 +28,8 @@ from arcor2_server.demo.workplace import load
 from tests.e2e.harness import WORKPLACE, Cell, scene_state
 from tests.editor import texts
 from tests.editor.pseudo import LOCALE, PseudoWords, names_in, untranslated, use_pseudo_locale
+from tests.editor.scene_with_camera import NAMES, camera_of, configure_markers, new_scene
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
-from tests.editor.seen_scene import NAMES, camera_of, configure_markers, new_scene
 from tests.editor.tour import JOINING, Tour
 from tests.editor.words import Words
 

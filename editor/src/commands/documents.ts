@@ -5,7 +5,7 @@ import { theEngine } from "../session/engine";
 import { openId } from "../store/selectors";
 import type { State } from "../store/state";
 import { getState } from "../store/store";
-import { awaited } from "./awaited";
+import { awaited } from "./ownEvents";
 import { ask, refusal, withLock } from "./requests";
 
 export const openScene = (id: string) => ask("OpenScene", { id });

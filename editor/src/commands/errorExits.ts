@@ -6,7 +6,7 @@ import { cannotLead } from "../program/logic";
 import { freeErrorName } from "../program/naming";
 import { call } from "../session/connection";
 import { getState, notify, select } from "../store/store";
-import { awaited } from "./awaited";
+import { awaited } from "./ownEvents";
 import { ask, newStep, refusal, sentence, withLock } from "./requests";
 
 /** Add an error exit from an action and store the error, as one step of undo. Notify the user if it is impossible. */

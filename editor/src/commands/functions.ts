@@ -8,8 +8,8 @@ import type { FunctionExport, Parameter } from "../protocol/types";
 import { call } from "../session/connection";
 import { scopeOf } from "../store/scope";
 import { getState, notify, select, setUi, showFunction } from "../store/store";
-import { awaited } from "./awaited";
 import { saveAs } from "./files";
+import { awaited } from "./ownEvents";
 import { ask, refusal, sentence, whyNot } from "./requests";
 
 // ------------------------------------------------------------------------------------------------ selection

@@ -9,7 +9,7 @@ import { callsIn } from "../program/parallel";
 import type { CallOptions } from "../protocol/client";
 import { call } from "../session/connection";
 import { getState, notify, select, setUi } from "../store/store";
-import { awaited } from "./awaited";
+import { awaited } from "./ownEvents";
 import { addLoose, insert } from "./program";
 import { ask, newStep, sentence, whyNot } from "./requests";
 

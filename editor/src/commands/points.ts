@@ -7,7 +7,7 @@ import { call } from "../session/connection";
 import type { State } from "../store/state";
 import { getState, select } from "../store/store";
 import { relativeTo, worldOf } from "../viewmodel/frames";
-import { awaited } from "./awaited";
+import { awaited } from "./ownEvents";
 import { newStep, refusal, withLock } from "./requests";
 import { type RobotSelection, robotArg } from "./robot";
 

@@ -22,8 +22,8 @@ import { scopeOf } from "../store/scope";
 import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
 import { getState, notify, select, setUi, store } from "../store/store";
-import { awaited } from "./awaited";
 import { addErrorExit } from "./errorExits";
+import { awaited } from "./ownEvents";
 import { ask, newStep, refusal, sentence, withLock } from "./requests";
 import { startingParameters, type Where } from "./startingValues";
 

@@ -23,8 +23,8 @@ import type { State } from "../store/state";
 import { getState, notify, select, setUi } from "../store/store";
 import { lifted } from "../transform/sizes";
 import { ORIGIN, plus, rotated } from "../viewmodel/frames";
-import { awaited } from "./awaited";
 import { aimedPlace } from "./crosshair";
+import { awaited } from "./ownEvents";
 import { ask, refusal, sentence, withLock } from "./requests";
 
 /** Requests that are also possible while the scene is online. */

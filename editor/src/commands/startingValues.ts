@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { compareTexts } from "../formats";
 import { needsPlace } from "../program/chain";
-import { decoded } from "../program/decoded";
+import { decoded } from "../program/json";
 import { calledBy, metaOf, PASSED_ON } from "../program/logic";
 import { freeName } from "../program/naming";
 import { initialValue } from "../program/values";
@@ -13,7 +13,7 @@ import { call } from "../session/connection";
 import { put } from "../store/records";
 import type { State } from "../store/state";
 import { getState, store } from "../store/store";
-import { awaited } from "./awaited";
+import { awaited } from "./ownEvents";
 import { withLock } from "./requests";
 
 /** The place for a new action: a point, or a position in the world, where a point is added. */

@@ -6,7 +6,7 @@ import { dateAndTime, decimal, hours } from "../formats";
 import { translate } from "../i18n/serverMessages";
 import { splitAddress } from "../program/messages";
 import type { AlarmSummary, FleetAlarm, FleetCause } from "../protocol/types";
-import { PRIORITIES } from "../ui/alarms/words";
+import { PRIORITIES } from "../ui/alarms/texts";
 import { Waiting } from "../ui/kit/kit";
 import { RefusedText } from "../ui/points/Refusal";
 import { Filters } from "./Filters";

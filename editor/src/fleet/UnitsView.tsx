@@ -11,8 +11,8 @@ import { ModalDialog } from "../ui/kit/dialogs";
 import { SwitchField } from "../ui/kit/fields";
 import { Button, Waiting } from "../ui/kit/kit";
 import { RefusedText } from "../ui/points/Refusal";
+import { UNIT_STATES, UNIT_TONES } from "../ui/production/texts";
 import { nameOf, UnitDetails } from "../ui/production/UnitDetails";
-import { UNIT_STATES, UNIT_TONES } from "../ui/production/words";
 import { Filters } from "./Filters";
 import { Listed } from "./Listed";
 import {

@@ -6,7 +6,7 @@ import { clock, compareTexts } from "../formats";
 import { translate } from "../i18n/serverMessages";
 import { splitAddress } from "../program/messages";
 import type { FleetCard, FleetState } from "../protocol/types";
-import { STATES } from "../ui/cell/words";
+import { STATES } from "../ui/cell/texts";
 import type { IconName } from "../ui/kit/icons";
 
 /** How urgently a cell needs attention, most urgently first. */

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import type { LogicComparison, LogicWhen, Operator, ProjectLogicIf } from "../protocol/types";
 import type { OpenDocument, State } from "../store/state";
-import { decoded } from "./decoded";
+import { decoded } from "./json";
 import { BRANCHABLE, conditionActions, isRange, linkTo, type Operand, operandAt, resultsOf, SIGNS } from "./logic";
 import { OWN_PARAMETERS } from "./values";
 

@@ -7,7 +7,7 @@ import { t } from "@lingui/core/macro";
 import { decimal } from "../formats";
 import type { LogicComparison, LogicItem, LogicWhen } from "../protocol/types";
 import type { OpenDocument, State } from "../store/state";
-import { decoded } from "./decoded";
+import { decoded } from "./json";
 import { nextSteps, operandAt, outgoing, placeOf, START, whenOf } from "./logic";
 import { runnerOf } from "./parallel";
 import { hasComparisons, isConditional, isErrorExit } from "./steps";

@@ -9,7 +9,7 @@ import { freeErrorName } from "./naming";
 import { problemsOf, usersOf } from "./problems";
 import { runsOf } from "./runs";
 import { valuesOf } from "./step";
-import { takenExit } from "./taken";
+import { takenExit } from "./takenExit";
 import { program, TYPES } from "./testing";
 
 /** Scan, then place; an error is shown, and the board is dropped. */

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import type { Action } from "../protocol/types";
 import { inScope, pointUsed, scopeOf } from "../store/scope";
 import type { OnPoint, OpenDocument, OpenFunction } from "../store/state";
-import { decoded } from "./decoded";
+import { decoded } from "./json";
 import { ordered } from "./listing";
 import { after, before, calledBy, END, outgoing, PASSED_ON, placeOf, START } from "./logic";
 import { freeName } from "./naming";

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { OpenDocument } from "../store/state";
-import { decoded } from "./decoded";
+import { decoded } from "./json";
 import { branchKind, incoming, outgoing, placeOf } from "./steps";
 
 /**

@@ -17,7 +17,7 @@ import type {
 } from "../protocol/types";
 import { perObject } from "../store/memo";
 import type { OnPoint, OpenDocument, OpenFunction, State } from "../store/state";
-import { decoded } from "./decoded";
+import { decoded } from "./json";
 
 /** Return the description of an action by its type; undefined if unknown. */
 export function metaOf(

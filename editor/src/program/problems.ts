@@ -5,9 +5,9 @@ import type { Action } from "../protocol/types";
 import { inScope, scopeOf } from "../store/scope";
 import type { OnPoint, OpenDocument, State } from "../store/state";
 import { branchProblems, canLackResults } from "./completeness";
-import { decoded } from "./decoded";
 import { errorAt, hasFailed, linkToError, partNames } from "./errorExits";
 import { onAllPaths, resultOf } from "./functions";
+import { decoded } from "./json";
 import { whyNotAtOnce } from "./lanes";
 import {
   after,

@@ -1,7 +1,7 @@
 /** Reachability of the targets of an action. Pure functions. */
 
 import type { Action, Reach, ReachabilityData } from "../protocol/types";
-import { decoded } from "./decoded";
+import { decoded } from "./json";
 
 /** Reachabilities from best to worst. */
 const REACHES: readonly Reach[] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];

@@ -4,7 +4,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { decimal, numberFrom } from "../formats";
 import type { ActionParameter, ParameterMeta } from "../protocol/types";
-import { decoded } from "./decoded";
+import { decoded } from "./json";
 
 /** Additional data of a parameter. */
 export interface Extra {

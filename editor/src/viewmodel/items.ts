@@ -8,7 +8,7 @@ import { calledBy, whenOf, whenWords } from "../program/operands";
 import { parallelOf } from "../program/parallel";
 import { reachOfAction, worse } from "../program/reach";
 import { type BranchKind, branchKind, hasComparisons, placeKey } from "../program/steps";
-import { takenExit } from "../program/taken";
+import { takenExit } from "../program/takenExit";
 import type { LogicItem, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import type { OpenDocument, State } from "../store/state";

@@ -11,7 +11,7 @@ import msgspec
 from arcor2_fakes.cell import seen_objects
 from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.layout import Layout
-from arcor2_fakes.cell.things import Inputs, Printed, Robot
+from arcor2_fakes.cell.world_data import Inputs, Printed, Robot
 from arcor2_fakes.control import ControlClient, ControlError
 
 _RETRY_PERIOD = 0.1

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from arcor2_fakes.cell.layout import Labelling, Matrix
-from arcor2_fakes.cell.things import Label, Printed, Thing
+from arcor2_fakes.cell.world_data import Label, Printed, Thing
 
 Point = tuple[float, float, float]
 """A position in the world, m."""

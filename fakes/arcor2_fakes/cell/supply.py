@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from arcor2_fakes.cell.layout import Belt, Feeder, Matrix, Place
-from arcor2_fakes.cell.things import Thing
+from arcor2_fakes.cell.world_data import Thing
 
 _TOUCHING = 1e-6
 

@@ -15,7 +15,7 @@ from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.labelling import LabelNest
 from arcor2_fakes.cell.layout import Layout, Matrix
 from arcor2_fakes.cell.supply import BoardBelt, Magazine, Supply
-from arcor2_fakes.cell.things import Event, Inputs, Robot, Thing
+from arcor2_fakes.cell.world_data import Event, Inputs, Robot, Thing
 
 PLACES = ("feeder", "belt", "gripper", "tester", "label", "good", "bad", "lost", "removed")
 

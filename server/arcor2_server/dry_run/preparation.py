@@ -21,7 +21,7 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
 from arcor2_hw.messages import Message
 from arcor2_server.documents import logic_graph
 from arcor2_server.documents.logic_graph import Flow
-from arcor2_server.dry_run import experience
+from arcor2_server.dry_run import past_runs
 from arcor2_server.dry_run.motions import UnknownTarget, maxima_of, moves_of
 
 
@@ -101,17 +101,17 @@ def prepare(
                 next=names.get(wanted, wanted),
             )
     traces = earlier.traces
-    usual = experience.branches(traces[0], following) if traces else {}
+    usual = past_runs.branches(traces[0], following) if traces else {}
     moves, assumptions = _moves(actions, index, devices)
     methods = {action.id: _method(action, devices) for action in actions}
-    measured = experience.durations(earlier.unchanged, {key: one.method for key, one in moves.items()})
+    measured = past_runs.durations(earlier.unchanged, {key: one.method for key, one in moves.items()})
     return DryRunTask(
         Graph(steps, branches, usual, firsts),
         {key: device.name for key, device in devices.items()},
         _first(steps[:program], args.from_action),
         {step.device: _moving(devices[step.device], project, step.device) for step in steps if step.action_id in moves},
         moves,
-        experience.durations(traces, methods),
+        past_runs.durations(traces, methods),
         {key: one.seconds for key, one in measured.items() if one.source.source is DurationSource.ACTION},
         dict(earlier.additions),
         assumptions,
@@ -171,7 +171,7 @@ def _first(steps: Sequence[Step], wanted: str | Unset) -> int:
     raise NotFound("The program does not execute an action {id}.", id=wanted)
 
 
-def _method(action: Action, devices: Mapping[str, Device]) -> experience.Method:
+def _method(action: Action, devices: Mapping[str, Device]) -> past_runs.Method:
     object_id, method = action.parse_type()
     device = devices.get(object_id)
     return f"{object_id if device is None else device.type}.{method}"

@@ -24,7 +24,7 @@ from arcor2_hw.messages import Message
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.compute.workers import Compute
 from arcor2_server.documents import Session
-from arcor2_server.dry_run.experience import MAX_RUNS
+from arcor2_server.dry_run.past_runs import MAX_RUNS
 from arcor2_server.dry_run.preparation import Device, Experience, prepare
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.object_types.registry import ObjectTypes

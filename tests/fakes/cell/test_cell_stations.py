@@ -15,8 +15,8 @@ from arcor2_fakes.cell import seen_objects
 from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.layout import Layout
 from arcor2_fakes.cell.supply import BoardBelt
-from arcor2_fakes.cell.things import Inputs, Printed, Robot, Thing
 from arcor2_fakes.cell.world import World
+from arcor2_fakes.cell.world_data import Inputs, Printed, Robot, Thing
 
 PLAIN = msgspec.json.decode(Path(arcor2_fakes.cell.__file__).with_name("example.json").read_bytes())
 TOLERANCE = {"position": 0.01, "height": 0.02, "tilt": 0.15}

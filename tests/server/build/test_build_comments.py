@@ -13,8 +13,8 @@ from msgspec.structs import replace
 from arcor2_hw.data.project import END, START, Action, Flow, LogicItem, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidProject
+from arcor2_server.build.merging.equivalence import action_name
 from arcor2_server.build.merging.matching import walk
-from arcor2_server.build.merging.meaning import action_name
 from arcor2_server.build.reading import from_script
 from arcor2_server.build.script import from_logic, read_with_text
 from tests.server.build import workplace

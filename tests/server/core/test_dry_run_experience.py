@@ -4,7 +4,7 @@ from arcor2_hw.compute.dry_run_tasks import KnownDuration
 from arcor2_hw.compute.program_walk import UsualBranch
 from arcor2_hw.data.dry_run import ActionDuration, DurationSource
 from arcor2_hw.data.run_trace import RunTrace, Span
-from arcor2_server.dry_run.experience import branches, durations
+from arcor2_server.dry_run.past_runs import branches, durations
 
 METHODS = {"a": "Lamp.blink", "b": "Lamp.blink", "c": "Belt.run", "d": "Belt.halt"}
 FAILED = Span(4, "c", "c", "belt", 9.0, 60.0, error="It jams.")

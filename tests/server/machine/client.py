@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tests.server.document_picture import DocumentCopy
+from tests.server.document_copy import DocumentCopy
 from tests.server.session.session_server import Person, SessionServer
 
 Flat = dict[tuple[str, str], Any]

@@ -20,7 +20,7 @@ from arcor2_server.documents.checks.actions import action_meta
 from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.logic import check_logic_item
 from tests.server.crash_copy import copy_at_one_moment
-from tests.server.document_picture import DocumentCopy
+from tests.server.document_copy import DocumentCopy
 from tests.server.machine.client import Client, Flat, flat
 from tests.server.machine.requests import EDITS, SCENE_EDITS, Draw, Request
 from tests.server.session.session_server import Refused, open_server

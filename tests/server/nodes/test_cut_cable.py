@@ -13,7 +13,7 @@ from tests.server.nodes.conftest import NODE
 
 def cut_and_heal(cable: Cable, folder: Path) -> dict[str, object]:
     words = [json.dumps(each) for each in (cable.cut(), cable.heal(), cable.at_node)]
-    command = [*cable.at_hub, sys.executable, "-m", "tests.server.nodes.cutting", str(folder), *words]
+    command = [*cable.at_hub, sys.executable, "-m", "tests.server.nodes.cable_cut", str(folder), *words]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True, timeout=200)
     found: dict[str, object] = json.loads(done.stdout)
     return found

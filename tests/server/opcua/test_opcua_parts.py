@@ -24,7 +24,7 @@ from arcor2_hw.data.packml import MachineCommand, MachineState, UnitMode
 from arcor2_hw.data.points import LivePoint, PointUse
 from arcor2_hw.data.robot import RobotMeta, RobotType
 from arcor2_hw.data.units import Unit, UnitState
-from arcor2_hw.opcua import access, interest, unit
+from arcor2_hw.opcua import access, monitored_devices, unit
 from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
 from arcor2_hw.opcua.conditions import Conditions
 from arcor2_hw.opcua.devices import Device
@@ -388,7 +388,7 @@ async def test_only_devices_that_clients_monitor_or_have_just_read_are_observed(
         key: SimpleNamespace(nodes=list(nodes), monitored=False, connected=key != "off") for key, nodes in names.items()
     }
     watched: list[list[str]] = []
-    monitored = interest.MonitoredDevices(devices, watched.append)
+    monitored = monitored_devices.MonitoredDevices(devices, watched.append)
     monitored.update()
     assert watched == [[]]
     await monitored.need([ua.NodeId(2258), ua.NodeId("cell/Production", 9), ua.NodeId("devices/off/Points/DI1", 9)])
@@ -404,14 +404,14 @@ async def test_only_devices_that_clients_monitor_or_have_just_read_are_observed(
     await reading
     await monitored.need([ua.NodeId("robots/arm/Axes/j2", 9)])  # current already
 
-    monkeypatch.setattr(interest, "FIRST_VALUES", 0.0)
+    monkeypatch.setattr(monitored_devices, "FIRST_VALUES", 0.0)
     await monitored.need(
         [ua.NodeId("devices/io/Points/DI1", 9)]
     )  # a device that does not answer delays the client no longer
     assert watched[-1] == ["arm", "io"]
     devices["io"].monitored = True
-    later = time.monotonic() + interest.LEASE
-    monkeypatch.setattr(interest, "time", SimpleNamespace(monotonic=lambda: later))
+    later = time.monotonic() + monitored_devices.LEASE
+    monkeypatch.setattr(monitored_devices, "time", SimpleNamespace(monotonic=lambda: later))
     monitored.update()
     assert watched[-1] == ["io"]
     devices["io"].monitored = False

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.workspace.point_registration import fit
-from tests.server.protocol.stage import FOCUS_POINTS, Actor, Stage, open_stage, refused, until_event
+from tests.server.protocol.in_process_server import FOCUS_POINTS, Actor, Stage, open_stage, refused, until_event
 
 TRUE_POSE = Pose(Position(0.5, -0.3, 0.2), Orientation.from_rotation_vector(0.3, -0.2, 1.1))
 

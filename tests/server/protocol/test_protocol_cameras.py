@@ -25,7 +25,7 @@ from arcor2_server.compute.process import ProgressCallback
 from arcor2_server.errors import RequestRefused
 from arcor2_server.rest.cameras import CameraOperations
 from arcor2_server.workspace.calibration import RobotView
-from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, refused, until_event
 
 PARAMETERS = {"fx": 600, "fy": 610, "cx": 320, "cy": 240, "dist_coefs": [0, 0, 0, 0]}
 FOUND = Pose(Position(1, 2, 3), Orientation(0, 0, 1, 0))

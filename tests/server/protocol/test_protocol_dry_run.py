@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from arcor2_hw.data.geometry import Pose
-from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, refused, until
 from tests.server.protocol.test_protocol_reachability import move, point
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from tests.server.protocol.stage import Actor, Stage, open_stage, refused
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, refused
 
 
 def new_events(actor: Actor) -> list[tuple[str, str | None, str | None, Any]]:

@@ -12,7 +12,7 @@ import pytest_asyncio
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
 from tests.server.protocol.devices import DUMB_ARM, PART
-from tests.server.protocol.stage import Actor, Stage, open_stage, refused
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, refused
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

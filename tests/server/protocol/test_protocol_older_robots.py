@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, refused, until_event
 
 
 async def tip_of(actor: Actor, robot: str, **arm: str) -> dict[str, float]:

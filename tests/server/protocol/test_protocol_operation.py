@@ -8,7 +8,7 @@ import pytest
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
-from tests.server.protocol.stage import Actor, open_stage, refused, until, until_event
+from tests.server.protocol.in_process_server import Actor, open_stage, refused, until, until_event
 from tests.server.protocol.test_protocol_states import enter, outcome
 from tests.server.protocol.test_protocol_temporary import project
 from tests.server.session.session_server import Refused

@@ -10,7 +10,7 @@ import pytest
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_server.online.perpendicular import CHECKED_YAWS, DOWN, joint_change, yaw_of, yaws
-from tests.server.protocol.stage import open_stage, refused, until_event
+from tests.server.protocol.in_process_server import open_stage, refused, until_event
 
 
 @pytest.mark.parametrize("yaw", [-3.0, -0.5, 0.0, 0.25, 3.1])

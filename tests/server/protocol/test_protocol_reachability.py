@@ -16,7 +16,7 @@ from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Joint
 from arcor2_server.documents.changes import Kind
 from tests.server.protocol.devices import PART
-from tests.server.protocol.stage import PATIENCE, Actor, Stage, open_stage, refused, until
+from tests.server.protocol.in_process_server import PATIENCE, Actor, Stage, open_stage, refused, until
 
 DOWN = {"x": 1, "y": 0, "z": 0, "w": 0}
 CRATE = PART.replace("class Part", "class Crate")

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from arcor2_hw.data.project import Action, Project
-from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, refused, until_event
 
 FLOW = {"type": "default", "outputs": ["number"]}
 

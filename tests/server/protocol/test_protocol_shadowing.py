@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from arcor2_hw.data.object_type import ObjectTypeSource
-from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, refused, until_event
 
 LOGIC = """
 from arcor2.data.common import ActionMetadata

@@ -6,7 +6,7 @@ from typing import Any
 
 from arcor2_hw.data.rpc import RPCS
 from tests.protocol import STATES
-from tests.server.protocol.stage import Actor, Stage, open_stage
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage
 from tests.server.session.test_session_states import example
 
 CLASSES = {

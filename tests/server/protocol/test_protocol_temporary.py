@@ -9,7 +9,7 @@ import pytest
 
 from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.exceptions import StorageError
-from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until, until_event
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, refused, until, until_event
 
 CLOSED = ["ProjectClosed", "PackageChanged/add", "PackageState started", "PackageState running", "PackageInfo"]
 OPENED = ["PackageState stopping", "PackageState stopped", "PackageChanged/remove", "OpenProject"]

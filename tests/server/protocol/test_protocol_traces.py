@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from tests.protocol import session
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, until
 from tests.server.protocol.recorded import ROBOT, uploads
-from tests.server.protocol.stage import Actor, Stage, open_stage, until
 from tests.server.session.test_session_traces import Mapping, plain
 
 SESSIONS = (

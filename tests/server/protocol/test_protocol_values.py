@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until_event
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, refused, until_event
 
 
 def parent(name: str, value: Any) -> dict[str, str]:

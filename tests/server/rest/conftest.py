@@ -14,7 +14,7 @@ from arcor2_server.app import Server, running_server
 from arcor2_server.settings import ServerSettings
 from tests import forked_children
 from tests.server.core.serving import ServerProcess, until
-from tests.server.rest.asking import rest_client, start_workers
+from tests.server.rest.rest_client import rest_client, start_workers
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

@@ -17,7 +17,7 @@ from arcor2_hw.client import Client
 from arcor2_hw.data.base import Unset
 from tests import commands
 from tests.server.core.serving import RawConnection, ServerProcess, running, talking
-from tests.server.rest.asking import granted, refused
+from tests.server.rest.rest_client import granted, refused
 
 COUNT = """
 import time

@@ -25,7 +25,7 @@ from arcor2_server.storage.damage_notices import DataDamage
 from arcor2_server.websocket.hub import Hub
 from arcor2_server.workspace.markers import Markers
 from benchmarks import rendering
-from tests.server.rest.asking import granted, refused
+from tests.server.rest.rest_client import granted, refused
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

@@ -17,7 +17,7 @@ from arcor2_server.app import Server, running_server
 from arcor2_server.execution.runs import RunStart
 from arcor2_server.settings import ServerSettings
 from tests.runtime.conftest import scene_object
-from tests.server.rest.asking import granted, rest_client
+from tests.server.rest.rest_client import granted, rest_client
 
 
 def report(server: Server, value: float | str) -> None:

@@ -16,7 +16,7 @@ from arcor2_server.websocket.classic_ports import SOCKET, ports_from_environment
 from arcor2_server.websocket.execution_endpoint import EVENTS, REQUESTS
 from tests.protocol import PROTOCOL
 from tests.server.core.serving import RawConnection, ServerProcess, running, talking
-from tests.server.rest.asking import granted
+from tests.server.rest.rest_client import granted
 from tests.server.rest.test_rest_build_and_run import as_file, base, prepare, published
 
 FREE_PORTS = {

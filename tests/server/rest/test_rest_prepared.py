@@ -21,7 +21,7 @@ from arcor2_hw.messages import Message
 from arcor2_server.app import Server
 from arcor2_server.collaboration.tasks import Task
 from arcor2_server.workspace import display_models as prepared_module
-from tests.server.rest.asking import granted, refused
+from tests.server.rest.rest_client import granted, refused
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

@@ -13,7 +13,7 @@ from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_server.app import running_server
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import until
-from tests.server.rest.asking import granted, refused, rest_client
+from tests.server.rest.rest_client import granted, refused, rest_client
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

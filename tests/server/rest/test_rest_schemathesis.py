@@ -17,7 +17,7 @@ from arcor2_server.rest.operations import Operation
 from arcor2_server.settings import ServerSettings
 from tests import forked_children
 from tests.server.core.serving import until
-from tests.server.rest.asking import TRANSLATION, start_workers
+from tests.server.rest.rest_client import TRANSLATION, start_workers
 
 EXAMPLES = 8
 """Number of examples for each of about seventy operations."""

@@ -14,7 +14,7 @@ from arcor2_server.object_types import notifications
 from arcor2_server.rest.field_names import camelized, snaked
 from tests.server.build import workplace
 from tests.server.core.serving import until
-from tests.server.rest.asking import granted, refused
+from tests.server.rest.rest_client import granted, refused
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

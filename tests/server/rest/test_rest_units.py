@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.units import UnitRecord, UnitState, UnitStep, UsedCalibration
 from arcor2_server.app import Server
 from arcor2_server.storage.units import UnitStore
-from tests.server.rest.asking import granted
+from tests.server.rest.rest_client import granted
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

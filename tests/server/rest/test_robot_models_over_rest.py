@@ -10,7 +10,7 @@ from msgspec import UNSET
 
 from arcor2_server.app import Server
 from arcor2_server.object_types.robot_packages import robot_packages
-from tests.server.rest.asking import granted, refused
+from tests.server.rest.rest_client import granted, refused
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.events import SceneStateEnum
-from tests.server.document_picture import DocumentCopy
+from tests.server.document_copy import DocumentCopy
 from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, URL, Work
 

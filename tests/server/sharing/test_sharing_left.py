@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.role import Role
-from tests.server.protocol.stage import Actor, Stage, open_stage, until, until_event
+from tests.server.protocol.in_process_server import Actor, Stage, open_stage, until, until_event
 from tests.server.protocol.test_protocol_temporary import project
 from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, Work

@@ -11,7 +11,7 @@ from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.websocket.hub import Hub
-from tests.server.protocol.stage import Actor, open_stage, refused, until, until_event
+from tests.server.protocol.in_process_server import Actor, open_stage, refused, until, until_event
 from tests.server.protocol.test_protocol_temporary import project
 from tests.server.session.session_server import Refused
 

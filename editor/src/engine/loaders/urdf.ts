@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { LoadingManager, type Material, Mesh, type Object3D } from "three";
 import URDFLoader, { type URDFLink, type URDFRobot, type URDFVisual } from "urdf-loader";
-import { axesOf, linkGeometry } from "../dress";
+import { axesOf, linkGeometry } from "../linkHousings";
 import { readGlb } from "./glb";
 
 /** Materials: for coloured surfaces, and for all others. */

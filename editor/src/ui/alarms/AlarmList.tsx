@@ -17,8 +17,8 @@ import { OpenRecording } from "../recording/OpenRecording";
 import { useRecordings } from "../recording/useRecordings";
 import { useTicking } from "../times";
 import { Acknowledge } from "./AlarmCard";
+import { PRIORITIES } from "./texts";
 import { type Show, timesOf, useAlarms } from "./useAlarms";
-import { PRIORITIES } from "./words";
 import "./alarms.css";
 
 /** Time for which the button shelves an alarm, s. */

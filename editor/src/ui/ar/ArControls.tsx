@@ -9,7 +9,7 @@ import { Button } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import { MarkerOutlines } from "./MarkerOutlines";
 import { PlaceByHand } from "./PlaceByHand";
-import { adviceOf, gradeOf, qualityOf } from "./words";
+import { adviceOf, gradeOf, qualityOf } from "./texts";
 import "./ar.css";
 
 const SelectList = lazyComponent(() => import("./SelectList"));

@@ -21,7 +21,7 @@ import { notMovable, targetOf } from "../../transform/target";
 import { nameOf } from "../../viewmodel/names";
 import { FASTEST } from "../robot/motionOptions";
 import { phaseName } from "../run/RunBar";
-import { adviceOf, gradeOf, qualityOf } from "./words";
+import { adviceOf, gradeOf, qualityOf } from "./texts";
 
 /** Turn by a button, rad. */
 const TURN = Math.PI / 18;

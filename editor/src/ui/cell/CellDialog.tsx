@@ -12,8 +12,8 @@ import { ModalDialog } from "../kit/dialogs";
 import { Button, Waiting } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
 import { RefusedText, useRefusal } from "../points/Refusal";
+import { AUTHORITIES, MODES, plcText, programText, STATES } from "./texts";
 import { useCell } from "./useCell";
-import { AUTHORITIES, MODES, plcText, programText, STATES } from "./words";
 import "./cell.css";
 
 export default function CellDialog({ onClose }: { onClose: () => void }) {

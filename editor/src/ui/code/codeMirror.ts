@@ -38,7 +38,7 @@ import {
 } from "@codemirror/view";
 import { tags } from "@lezer/highlight";
 import { t } from "@lingui/core/macro";
-import { completionExtensions } from "./completing";
+import { completionExtensions } from "./completion";
 import { actionsOf, boilerplate, idsOf, type ScriptAction } from "./script";
 
 /** The marks at the lines of a script, by name of the action. */

@@ -1,7 +1,7 @@
 /** Completions in the text editor: names, actions, points, signatures. Pure functions. */
 
 import { t } from "@lingui/core/macro";
-import { decoded } from "../../program/decoded";
+import { decoded } from "../../program/json";
 import { CALL, metaOf } from "../../program/logic";
 import { freeName } from "../../program/naming";
 import { typeName } from "../../program/values";

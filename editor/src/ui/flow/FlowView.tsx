@@ -20,7 +20,7 @@ import { connect, finishConnecting, notEditable, removeAction, removeStep } from
 import { cannotLead } from "../../program/logic";
 import { problemsHere, problemsOf } from "../../program/problems";
 import { placeOf } from "../../program/steps";
-import { takenExit } from "../../program/taken";
+import { takenExit } from "../../program/takenExit";
 import { scopeOf } from "../../store/scope";
 import { getState, notify, select, setUi, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type ReactNode, useState } from "react";
-import { acknowledge, type Decision, decide } from "../../commands/held";
+import { acknowledge, type Decision, decide } from "../../commands/heldProgram";
 import { translate, translatedAlarm } from "../../i18n/serverMessages";
 import { splitAddress } from "../../program/messages";
 import type { AlarmRecord, Alarm as DeviceAlarm, HeldData, ResultType } from "../../protocol/types";

@@ -11,8 +11,8 @@ import { Button, Waiting } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { InterlockForm } from "./InterlockForm";
+import { needText } from "./texts";
 import { useInterlocks } from "./useInterlocks";
-import { needText } from "./words";
 import "./interlocks.css";
 
 const STATES: Record<InterlockCondition, MessageDescriptor> = {

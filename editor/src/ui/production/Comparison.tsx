@@ -11,7 +11,7 @@ import { call } from "../../session/connection";
 import { useEditor } from "../../store/store";
 import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
-import { RECIPE_STATES } from "./words";
+import { RECIPE_STATES } from "./texts";
 
 interface Props {
   before: Recipe;

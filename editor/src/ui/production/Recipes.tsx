@@ -16,7 +16,7 @@ import { RefusedText, useRefusal } from "../points/Refusal";
 import { Comparison } from "./Comparison";
 import { RecipeForm } from "./RecipeForm";
 import { SignForm } from "./SignForm";
-import { RECIPE_STATES, RECIPE_TONES } from "./words";
+import { RECIPE_STATES, RECIPE_TONES } from "./texts";
 
 type Opened = { kind: "edit"; recipe: Recipe | null } | { kind: "compare" | "delete" | "back"; recipe: Recipe };
 type Signing = { recipe: Recipe; state: Recipe["state"] };

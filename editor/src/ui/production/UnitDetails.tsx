@@ -6,7 +6,7 @@ import { shownRecipe } from "../../commands/production";
 import { dateAndTime, duration } from "../../formats";
 import { type Translations, translate } from "../../i18n/serverMessages";
 import type { UnitRecord } from "../../protocol/types";
-import { UNIT_STATES } from "./words";
+import { UNIT_STATES } from "./texts";
 import "./production.css";
 
 /** Return the name of a unit: its serial number, or the number of the part if it was never read. */

@@ -12,8 +12,8 @@ import { call } from "../../session/connection";
 import { ToggleGroup } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
+import { ACTIVITIES, UNIT_STATES, UNIT_TONES } from "./texts";
 import { nameOf, UnitDetails } from "./UnitDetails";
-import { ACTIVITIES, UNIT_STATES, UNIT_TONES } from "./words";
 
 /** Number of units that a search loads. */
 const MOST = 100;

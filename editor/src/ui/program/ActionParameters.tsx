@@ -3,13 +3,13 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { awaited } from "../../commands/awaited";
 import { addFunctionParameter, freeParameterName } from "../../commands/functions";
+import { awaited } from "../../commands/ownEvents";
 import { addParameter } from "../../commands/parameters";
 import { notEditable, setParameter } from "../../commands/program";
 import { dynamicValues, lastDynamicValues } from "../../commands/startingValues";
-import { decoded } from "../../program/decoded";
 import { linkToError, usableErrors } from "../../program/errorExits";
+import { decoded } from "../../program/json";
 import { linkTo, metaOf, usable } from "../../program/logic";
 import { freeName, words } from "../../program/naming";
 import { extraOf, initialValue, SIMPLE, type Source, sourceOf, typeName } from "../../program/values";

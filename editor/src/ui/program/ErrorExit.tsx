@@ -10,7 +10,7 @@ import { ANY, kindWords } from "../../program/errorKinds";
 import { freeErrorName } from "../../program/naming";
 import { usersOf } from "../../program/problems";
 import { isErrorExit, placeOf } from "../../program/steps";
-import { takenExit } from "../../program/taken";
+import { takenExit } from "../../program/takenExit";
 import { derivesFrom } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { getState, notify, select, useEditor } from "../../store/store";

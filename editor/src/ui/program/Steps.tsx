@@ -19,7 +19,7 @@ import { isParallel } from "../../program/parallel";
 import type { Problem } from "../../program/problems";
 import { valuesOf } from "../../program/step";
 import { END, placeOf } from "../../program/steps";
-import { takenExit } from "../../program/taken";
+import { takenExit } from "../../program/takenExit";
 import { theEngine } from "../../session/engine";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";

@@ -8,12 +8,12 @@ const OVERLAYS = {
   search: lazyComponent(() => import("./Palette")),
   about: lazyComponent(() => import("./About")),
   messages: lazyComponent(() => import("../notices/Messages")),
-  persons: lazyComponent(() => import("./more").then((more) => more.persons())),
-  pin: lazyComponent(() => import("./more").then((more) => more.pin())),
-  audit: lazyComponent(() => import("./more").then((more) => more.audit())),
-  interlocks: lazyComponent(() => import("./more").then((more) => more.interlocks())),
-  cell: lazyComponent(() => import("./more").then((more) => more.cell())),
-  production: lazyComponent(() => import("./more").then((more) => more.production())),
+  persons: lazyComponent(() => import("./lazyDialogs").then((more) => more.persons())),
+  pin: lazyComponent(() => import("./lazyDialogs").then((more) => more.pin())),
+  audit: lazyComponent(() => import("./lazyDialogs").then((more) => more.audit())),
+  interlocks: lazyComponent(() => import("./lazyDialogs").then((more) => more.interlocks())),
+  cell: lazyComponent(() => import("./lazyDialogs").then((more) => more.cell())),
+  production: lazyComponent(() => import("./lazyDialogs").then((more) => more.production())),
 };
 
 export function Overlays() {

@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Hashable, Iterator, Sequence
 
 from arcor2_server.build.frame import NEXT_ACTION
-from arcor2_server.build.merging.meaning import action_name, condition, negated
+from arcor2_server.build.merging.equivalence import action_name, condition, negated
 from arcor2_server.build.merging.text import Block, Statement
 
 Parts = list[tuple[object, list[ast.stmt]]]

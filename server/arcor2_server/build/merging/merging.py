@@ -14,13 +14,13 @@ from arcor2_hw.data.project import Action, ActionParameter, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.build.frame import DOCSTRING, ChosenNames, Frame, References, TypeFacts
+from arcor2_server.build.merging.equivalence import DeclaredParameter
 from arcor2_server.build.merging.matching import Matching
-from arcor2_server.build.merging.meaning import DeclaredParameter
 from arcor2_server.build.merging.patching import CannotPatch, Edit, Patches, apply
 from arcor2_server.build.merging.text import Lines, Statement, Text
 from arcor2_server.build.merging.writing import MergingWriter
 from arcor2_server.build.reading import completed_from_script
-from arcor2_server.build.reading.completing import completed
+from arcor2_server.build.reading.completion import completed
 from arcor2_server.build.style import Writer
 
 log = structlog.get_logger(__name__)

@@ -4,8 +4,8 @@ import ast
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from arcor2_server.build.merging.equivalence import DeclaredOf, action_name, same
 from arcor2_server.build.merging.matching import Matching, names_in, parts_of, walk
-from arcor2_server.build.merging.meaning import DeclaredOf, action_name, same
 from arcor2_server.build.merging.text import Block, Lines, Statement, Text
 from arcor2_server.build.merging.writing import MergingWriter
 from arcor2_server.build.style import Writer

@@ -4,8 +4,8 @@ import ast
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 
+from arcor2_server.build.merging.equivalence import DeclaredOf, same
 from arcor2_server.build.merging.matching import Matching, parts_of
-from arcor2_server.build.merging.meaning import DeclaredOf, same
 from arcor2_server.build.merging.text import Block, Lines, Statement, Text
 from arcor2_server.build.style import Writer
 

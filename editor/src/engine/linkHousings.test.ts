@@ -1,6 +1,6 @@
 import { CylinderGeometry, Matrix4, Mesh, SphereGeometry, Vector3 } from "three";
 import { expect, it } from "vitest";
-import { linkGeometry } from "./dress";
+import { linkGeometry } from "./linkHousings";
 
 it("spheres on the axis of a joint become housings along it, others stay", () => {
   const sphere = (x: number) => ({

@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { notify } from "../store/store";
-import { awaited } from "./awaited";
+import { awaited } from "./ownEvents";
 
 beforeEach(() => vi.useFakeTimers());
 afterEach(() => vi.useRealTimers());

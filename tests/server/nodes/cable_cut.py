@@ -1,6 +1,7 @@
 """Cut the cable between a server and a node while a device moves; print what happens as JSON.
 
-Runs at the hub of a `Cable`: `python -m tests.server.nodes.cutting FOLDER CUT HEAL AT_NODE`, each a JSON list of words.
+Runs at the hub of a `Cable`: `python -m tests.server.nodes.cable_cut FOLDER CUT HEAL AT_NODE`, each argument a JSON
+list of words.
 """
 
 import asyncio

@@ -3,7 +3,7 @@
 import httpx
 
 from tests.server.core.serving import ServerProcess, talking
-from tests.server.rest.asking import granted
+from tests.server.rest.rest_client import granted
 from tests.server.rest.test_rest_build_and_run import base
 from tests.server.rest.test_rest_storage import lamp, scene
 

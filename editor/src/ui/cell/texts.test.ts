@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { CellStatus } from "../../protocol/types";
-import { noteText, plcText, programText } from "./words";
+import { noteText, plcText, programText } from "./texts";
 import "../../i18n/testing";
 
 const DEFAULT: CellStatus = { state: "idle", mode: "produce", authority: "hub", jobs: [], held_by_plc: false };

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Ar } from "../../store/ui";
-import { adviceOf, gradeOf, qualityOf } from "./words";
+import { adviceOf, gradeOf, qualityOf } from "./texts";
 
 const GOOD: Ar = {
   phase: "registered",

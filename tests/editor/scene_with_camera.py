@@ -10,7 +10,7 @@ from arcor2_hw.client import Client
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.parameter import Parameter
 from tests.e2e.harness import Cell
-from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, pose, rotated_about_z, visible_things
+from tests.e2e.workplace_with_camera import CAMERA, MARKERS, ROBOT, SIZE, Q, pose, rotated_about_z, visible_things
 
 SCENE = "by pictures"
 NAMES = {SCENE, "eye", "arm"}
