@@ -32,7 +32,7 @@ from .stream import (
 CLOCK_PERIOD: Final = 0.5
 """Time between requests for the source's clock, s."""
 CLOCKS: Final = 20
-"""Number of stored answers, of which the fastest is used. In these 10 s, two quartz clocks drift by at most 1 ms."""
+"""Number of stored answers, of which the closest bound is used. Two quartz clocks drift by at most 1 ms meanwhile."""
 
 
 class SourceFrame(NamedTuple):
@@ -63,7 +63,8 @@ class NetworkSource:
         self._socket: socket.socket | None = None
         self._sending = threading.Lock()
         self._buffer = bytearray(1 << 20)
-        self._offsets: deque[tuple[float, float]] = deque(maxlen=CLOCKS)
+        self._offsets: deque[float] = deque(maxlen=CLOCKS)
+        """Lower bounds of the difference between this computer's clock and the source's, s."""
         self._clock_asked_at = 0.0
         self._refusal: str = ""
         self._answered = threading.Condition()
@@ -168,10 +169,10 @@ class NetworkSource:
 
     def _handle(self, kind: Kind, header: bytes) -> None:
         if kind is Kind.CLOCK:
-            clock, now = read_header(header, Clock), time.monotonic()
-            if clock.asked > now or not math.isfinite(clock.at):
+            clock = read_header(header, Clock)
+            if clock.asked > time.monotonic() or not math.isfinite(clock.at):
                 raise BadStream("an answer to a clock request that was not sent")
-            self._offsets.append((now - clock.asked, (now + clock.asked) / 2.0 - clock.at))
+            self._offsets.append(clock.asked - clock.at)  # the source read its clock after the request
         elif kind is Kind.STATUS:
             self._on_status(read_header(header, Status))
             with self._answered:
@@ -196,9 +197,8 @@ class NetworkSource:
             raise BadStream(f"colour has {header.color_bytes} bytes, not {3 * size}")
         if header.depth_bytes not in (0, 2 * size):
             raise BadStream(f"depth has {header.depth_bytes} bytes, not {2 * size}")
-        _, offset = min(self._offsets)
-        # The estimated offset is wrong by up to half the round-trip time; a frame must not come from the future.
-        moment = min(header.stamp + offset, time.monotonic())
+        # An image from before a call must not appear to be from after it. It may appear older, by the round-trip time.
+        moment = min(header.stamp + max(self._offsets), time.monotonic())
         if not math.isfinite(moment):
             raise BadStream(f"a frame with the time stamp {header.stamp}")
         return SourceFrame(header, moment, payload[: header.color_bytes], payload[header.color_bytes :])

@@ -1,5 +1,8 @@
 """The stream's codec: messages byte for byte as in docs/devices/oak-d.md, and invalid bytes."""
 
+import socket
+import threading
+import time
 import zlib
 from typing import Any
 
@@ -8,7 +11,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from arcor2_drivers.oak_d import stream
+from arcor2_drivers.oak_d.network import NetworkSource
 from arcor2_drivers.oak_d.stream import BadStream, Clock, FrameHeader, Hello, Kind, Refusal, Status
+from arcor2_fakes.oak_d.stream import Kind as SourceKind, Questions, encode
 
 # magic, version, kind, length of the header, length of the payload, checksum; then the header and the payload
 HELLO = (
@@ -130,3 +135,38 @@ def test_random_bytes_raise_only_protocol_errors(data: bytes) -> None:
         except BadStream:
             continue
         assert zlib.crc32(each[:12] + data) == int.from_bytes(each[12:16], "big")
+
+
+def test_an_image_is_not_older_than_stated_although_answers_are_late() -> None:
+    """The source takes an image when it is asked for its clock. Its answer arrives 0.3 s later."""
+    taken: list[float] = []
+
+    def serve(listener: socket.socket) -> None:
+        link = listener.accept()[0]
+
+        def answer(kind: SourceKind, header: dict[str, Any]) -> None:
+            if kind is SourceKind.CLOCK:
+                taken.append(time.monotonic())
+                time.sleep(0.3)
+                stamp = taken[-1] - 100.0
+                image = {"number": 0, "stamp": stamp, "color": "bgr", "color_bytes": 3 * 16 * 16, "depth_bytes": 0}
+                link.sendall(encode(SourceKind.CLOCK, {**header, "at": stamp}))
+                link.sendall(encode(SourceKind.FRAME, image, bytes(3 * 16 * 16)))
+
+        hello = {"vendor": "V", "model": "M", "serial": "S", "firmware": "F", "width": 16, "height": 16, "fps": 30.0}
+        questions = Questions(answer)
+        with link:
+            link.sendall(encode(SourceKind.HELLO, {**hello, "depth_range": [0.2, 10.0]}, b"{}"))
+            while data := link.recv(4096):
+                questions.feed(data)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        source = NetworkSource("camera", "127.0.0.1", listener.getsockname()[1], "bgr", lambda status: None)
+        serving = threading.Thread(target=serve, args=[listener])
+        serving.start()
+        source.open(time.monotonic() + 10.0)
+        source.start("test")
+        frame = source.next_frame(10.0)
+        source.close()
+        serving.join()
+    assert frame.monotonic <= taken[0]
