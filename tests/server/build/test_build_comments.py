@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, assume, given, settings, strategies as st
+from hypothesis import HealthCheck, assume, example, given, settings, strategies as st
 from msgspec import UNSET
 from msgspec.structs import replace
 
@@ -69,15 +69,18 @@ def reformatted(source: str, rng: random.Random) -> str:
     return "\n".join([*lines, *([""] * rng.randrange(3))])
 
 
+def logic_of(rng: random.Random, size: int, merging: float, end_rate: float, conditions: str) -> Project:
+    draft = without_doubles(random_draft(rng, size, merging, end_rate, 3))
+    if conditions:
+        draft = with_choices(draft, rng) if conditions == "choices" else with_comparisons(draft, rng)
+    return with_exits(with_retries(with_variables(draft, rng), rng), rng).project()
+
+
 def program(
     seed: int, size: int, merging: float, end_rate: float, conditions: str, functions: int, parallel: bool
 ) -> tuple[Scene, Project]:
     rng = random.Random(seed)
-    draft = without_doubles(random_draft(rng, size, merging, end_rate, 3))
-    if conditions:
-        draft = with_choices(draft, rng) if conditions == "choices" else with_comparisons(draft, rng)
-    draft = with_exits(with_retries(with_variables(draft, rng), rng), rng)
-    project = draft.project()
+    project = logic_of(rng, size, merging, end_rate, conditions)
     steps = [(item.start, item.end, item.is_error_exit) for item in project.logic]
     assume(len(steps) == len(set(steps)))  # no editor creates two steps between the same two actions
     if functions:
@@ -190,6 +193,7 @@ def test_an_imported_script_is_generated_unchanged(made: tuple[Scene, Project], 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(programs, st.integers(0, 2**32))
+@example((SCENE, logic_of(random.Random(13316), 21, 0.0, 0.1, "")), 225)  # exchanged branches would change the logic
 def test_comments_survive_an_edit_of_the_logic(made: tuple[Scene, Project], seed: int) -> None:
     scene, project = made
     rng = random.Random(seed)

@@ -75,12 +75,14 @@ class Matching:
     Args:
         generated: the generated function.
         written: the function in the script.
+        exchange: whether to exchange the branches of a generated condition if the script states the opposite one.
     """
 
-    def __init__(self, generated: ast.FunctionDef, written: Statement) -> None:
+    def __init__(self, generated: ast.FunctionDef, written: Statement, *, exchange: bool = True) -> None:
         self.written: dict[ast.stmt, Statement] = {generated: written}
         """The written statement of each generated one."""
         self.generated: dict[Statement, ast.stmt] = {written: generated}
+        self._exchange = exchange
         self._by_key: dict[Hashable, list[Statement]] = defaultdict(list)
         for statement in written.inside():
             if (key := _key(statement.node)) is not None:
@@ -102,7 +104,7 @@ class Matching:
                 continue
             if found := self._by_key.get(key):
                 self._pair(node, found.pop())
-            elif isinstance(node, ast.If) and node.body and len(node.orelse) > 0:
+            elif self._exchange and isinstance(node, ast.If) and node.body and len(node.orelse) > 0:
                 self._exchanged(node)
 
     def _by_actions(self, body: Sequence[ast.stmt]) -> None:

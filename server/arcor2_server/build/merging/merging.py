@@ -81,7 +81,9 @@ def merged(scene: Scene, project: Project, types: Mapping[str, TypeFacts], tree_
     frame = Frame(scene, project, types, names)
     tree = tree_of(frame)
     wanted: Project | None = None
-    for way in (_patched, _rewritten):
+    for way in (_patched, _rewritten, _rewritten_in_order):
+        if way is _rewritten_in_order:
+            tree = tree_of(frame)  # the others have exchanged branches
         try:
             found = way(text, parts, tree, frame)
         except (CannotPatch, RecursionError):
@@ -111,16 +113,24 @@ def _with_sorted_parameters(project: Project) -> Project:
     return replace(project, action_points=points, functions=functions)
 
 
-# ---------------------------------------------------------------------------------------------- two ways
+# ---------------------------------------------------------------------------------------------- three ways
 def _patched(text: Text, parts: _Parts, tree: ast.Module, frame: Frame) -> str:
     """Return the script with changed, new and removed statements in the structure that a person has written."""
     matching, writer, declared = _prepared(text, parts, tree, frame)
     return _text(text, [*_outside(parts, tree), *Patches(text, matching, writer, declared).edits])
 
 
-def _rewritten(text: Text, parts: _Parts, tree: ast.Module, frame: Frame) -> str:
+def _rewritten_in_order(text: Text, parts: _Parts, tree: ast.Module, frame: Frame) -> str:
+    """Return the script with the structure of the generated one and its order of branches.
+
+    An `else` may have another condition than the opposite of its `if`. Exchanging the two would change the logic.
+    """
+    return _rewritten(text, parts, tree, frame, exchange=False)
+
+
+def _rewritten(text: Text, parts: _Parts, tree: ast.Module, frame: Frame, *, exchange: bool = True) -> str:
     """Return the script with the structure of the generated one."""
-    _, writer, _ = _prepared(text, parts, tree, frame)
+    _, writer, _ = _prepared(text, parts, tree, frame, exchange=exchange)
     main = _main(tree)
     lines = writer.statements([main], "")
     return _text(text, [*_outside(parts, tree), Edit(parts.main.above, parts.main.end, lines)])
@@ -131,9 +141,9 @@ def _text(text: Text, edits: Sequence[Edit]) -> str:
 
 
 def _prepared(
-    text: Text, parts: _Parts, tree: ast.Module, frame: Frame
+    text: Text, parts: _Parts, tree: ast.Module, frame: Frame, *, exchange: bool = True
 ) -> tuple[Matching, MergingWriter, "_DeclaredParameters"]:
-    matching = Matching(_main(tree), parts.main)
+    matching = Matching(_main(tree), parts.main, exchange=exchange)
     declared = _DeclaredParameters(frame)
     return matching, MergingWriter(frame.comments, text, matching, declared), declared
 
