@@ -162,7 +162,7 @@ export function acknowledgeStop(object_id: string): Promise<string> {
 interface GhostOptions {
   /** Return whether the answer is still needed; by default it is. */
   current?: () => boolean;
-  /** Whether the ghost is kept and marked as impossible if there are no joints for the pose. */
+  /** Whether to show the ghost as unreachable, instead of hiding it, if no joint values reach the pose. */
   keep?: boolean;
 }
 

@@ -10,7 +10,7 @@ async def confirm_sent(client: Client) -> None:
     that ping, they are sent, and the ping of a second call follows them.
 
     Raises:
-        nats.errors.Error: the connection is lost, or the broker does not answer within 10 s.
+        nats.errors.Error: the connection is lost, or the broker does not answer one of the pings within 10 s.
     """
     await client.flush()
     await client.flush()

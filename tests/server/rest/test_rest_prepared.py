@@ -107,7 +107,7 @@ async def test_a_broken_mesh_is_refused_after_one_attempt(http: httpx.AsyncClien
     for _ in range(2):
         refused(await http.get(SHOWN.format("asset_1")), 400, "Argument", "bracket.stl")
     assert runs == ["bracket.stl"]
-    await put(http, "asset_1", with_header(BALL, b"mended"), "bracket.stl", upsert=True)
+    await put(http, "asset_1", with_header(BALL, b"repaired"), "bracket.stl", upsert=True)
     assert (await http.get(SHOWN.format("asset_1"))).status_code == 200
     refused(await http.get(SHOWN.format("asset_2")), 404, "NotFound", "asset_2")
 
